@@ -1,0 +1,1 @@
+"""Underwater glider planning in ocean currents: exact legs, roadmaps, routes."""

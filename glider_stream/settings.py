@@ -1,0 +1,95 @@
+"""Frozen settings objects out of TOML tables: every key checked, none guessed.
+
+A block of a scenario is a frozen dataclass: a field without a default is a required key, its annotation is
+the key's type, its `__post_init__` checks the value. A new kind is one dataclass and one table row.
+"""
+
+import math
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Any, TypeVar
+
+from .errors import InputError
+
+T = TypeVar("T")
+
+
+def _described(kind: Any) -> str:
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(_described(part) for part in inner if part is not type(None))
+    if origin is typing.Literal:
+        return " or ".join(f'"{choice}"' for choice in inner)
+    if origin is tuple and inner[-1] is Ellipsis:
+        return f"a list, each {_described(inner[0])}"
+    if origin is tuple:
+        return f"a list of {len(inner)}, each {_described(inner[0])}"
+    if is_dataclass(kind):
+        return "a table"
+    return {float: "a finite number", int: "a whole number", str: "a text", bool: "true or false"}[kind]
+
+
+def _fits(value: Any, kind: Any, where: str) -> Any:
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        for part in inner:
+            if part is not type(None):
+                try:
+                    return _fits(value, part, where)
+                except InputError:
+                    continue
+    elif origin is typing.Literal:
+        if value in inner and not isinstance(value, bool):
+            return value
+    elif origin is tuple:
+        if isinstance(value, (list, tuple)) and (inner[-1] is Ellipsis or len(value) == len(inner)):
+            kinds = [inner[0]] * len(value) if inner[-1] is Ellipsis else inner
+            return tuple(_fits(v, k, where) for v, k in zip(value, kinds, strict=True))
+    elif is_dataclass(kind):
+        if isinstance(value, Mapping):
+            return from_table(typing.cast(type, kind), value, where)
+    elif kind is float:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            return float(value)
+    elif isinstance(value, kind) and (kind is bool or not isinstance(value, bool)):
+        return value
+    raise InputError(f"`{where}` must be {_described(kind)}; got {value!r}")
+
+
+def _known(name: str, choices: typing.Iterable[str], what: str) -> None:
+    choices = sorted(choices)
+    if name not in choices:
+        raise InputError(f"{what} is not known; choose from: {', '.join(choices)}")
+
+
+def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
+    """An object of the dataclass `kind` from a table; InputError names a key unknown, missing or ill-typed."""
+    hints = typing.get_type_hints(kind)
+    keys = {f.name: f for f in fields(typing.cast(Any, kind)) if f.init}
+    for key in table:
+        _known(key, keys, f"the key `{where}.{key}`")
+    for key, field in keys.items():
+        if key not in table and field.default is MISSING and field.default_factory is MISSING:
+            hint = field.metadata.get("missing", f"it must be {_described(hints[key])}")
+            raise InputError(f"`{where}.{key}` is missing: {hint}")
+    return kind(**{key: _fits(value, hints[key], f"{where}.{key}") for key, value in table.items()})
+
+
+def from_kinds(
+    kinds: Mapping[str, type[T]], table: Mapping[str, Any], where: str, selector: str = "kind"
+) -> T:
+    """As `from_table`, the class chosen by the key `selector`."""
+    rest = dict(table)
+    if selector not in rest:
+        raise InputError(f"`{where}.{selector}` is missing: choose from: {', '.join(sorted(kinds))}")
+    name = rest.pop(selector)
+    _known(str(name), kinds, f"`{where}.{selector}` = {name!r}")
+    return from_table(kinds[name], rest, where)
+
+
+def require(holds: bool, sentence: str) -> None:
+    """Raise InputError with `sentence` unless the condition holds."""
+    if not holds:
+        raise InputError(sentence)

@@ -1,0 +1,58 @@
+"""The disk cache of compiled entry points, keyed by the text of every kernel."""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit
+
+
+def _digest() -> str:
+    text = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        text.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
+    return text.hexdigest()
+
+
+KERNEL_DIGEST = _digest()
+"""SHA-256 of all kernel sources: part of the cache's place, and stored in every roadmap."""
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def cache_folder() -> Path | None:
+    """Where compiled kernels of this digest are kept; None where no place can be written."""
+    places = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
+    places += [Path(__file__).parent / "__pycache__"]
+    places += [Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "glider-stream"]
+    return next((p / KERNEL_DIGEST[:16] for p in places if _writable(p / KERNEL_DIGEST[:16])), None)
+
+
+def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a kernel that Python calls, cached on disk under the digest of all kernel sources.
+
+    Numba's own cache looks at the file of the entry point alone: after an edit to any other kernel
+    it would answer with old numbers. It reads `CACHE_DIR` once, when the function is decorated.
+    """
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        folder, before = cache_folder(), config.CACHE_DIR
+        if folder is None:
+            return njit(**options)(function)
+        try:
+            config.CACHE_DIR = str(folder)
+            return njit(cache=True, **options)(function)
+        finally:
+            config.CACHE_DIR = before
+
+    return compiled

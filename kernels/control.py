@@ -1,0 +1,229 @@
+"""Controls: the glide polar; the control plane and its line; the control surface (the baseline).
+
+A control is a glide angle and a heading, held for a whole leg. Directions: 0 dives, 1 climbs.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from numba import njit
+from numba.extending import overload
+
+from .flow import Array, mean_velocity
+from .stream import stream_value
+
+DIVE, CLIMB = 0, 1
+NO_CONTROL = -1
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+class Polar(NamedTuple):
+    """The glide polar: speed V [m/s] at even steps of the glide angle's magnitude, for dive and climb.
+
+    `speed` (2, n) runs from `shallowest` (2,) to `steepest` (2,) [rad], linear between. The horizontal
+    speed V cos(gamma) has one maximum, `best_horizontal` (2,) [m/s] at `best_angle` (2,) [rad].
+    """
+
+    shallowest: Array
+    steepest: Array
+    speed: Array
+    best_angle: Array
+    best_horizontal: Array
+
+
+class Control(NamedTuple):
+    """Velocity through water (u, v, w) [m/s]; its glide angle (signed) and heading [rad], speed [m/s]."""
+
+    u: float
+    v: float
+    w: float
+    glide_angle: float
+    heading: float
+    speed: float
+
+
+@njit
+def glide_speed(polar, direction, angle):
+    """V [m/s] at a glide angle's magnitude [rad]."""
+    last = polar.speed.shape[1] - 1
+    span = polar.steepest[direction] - polar.shallowest[direction]
+    at = min(max((angle - polar.shallowest[direction]) / span * last, 0.0), float(last))
+    below = min(int(at), last - 1)
+    low = polar.speed[direction, below]
+    return low + (at - below) * (polar.speed[direction, below + 1] - low)
+
+
+@njit
+def horizontal_speed(polar, direction, angle):
+    """V cos(gamma) [m/s]."""
+    return glide_speed(polar, direction, angle) * math.cos(angle)
+
+
+@njit
+def vertical_speed(polar, direction, angle):
+    """V |sin(gamma)| [m/s]; it rises with the angle."""
+    return glide_speed(polar, direction, angle) * math.sin(angle)
+
+
+@njit
+def control_towards(polar, direction, angle, heading):
+    """The control at a glide angle's magnitude and a heading [rad]."""
+    speed = glide_speed(polar, direction, angle)
+    signed = angle if direction == CLIMB else -angle
+    along = speed * math.cos(signed)
+    return Control(
+        along * math.cos(heading), along * math.sin(heading), speed * math.sin(signed), signed, heading, speed
+    )
+
+
+@njit
+def angle_of_horizontal_speed(polar, direction, speed, outer):
+    """The angle between `outer`, one end of the range, and the fastest, at which V cos(gamma) = speed.
+
+    `outer` itself where even that end is faster.
+    """
+    slow = outer
+    fast = polar.best_angle[direction]
+    if horizontal_speed(polar, direction, slow) >= speed:
+        return slow
+    for _ in range(52):
+        middle = 0.5 * (slow + fast)
+        if horizontal_speed(polar, direction, middle) < speed:
+            slow = middle
+        else:
+            fast = middle
+    return fast
+
+
+@njit
+def angle_of_vertical_speed(polar, direction, speed):
+    """The shallowest angle that sinks or climbs at least this fast; NaN where none does."""
+    low = polar.shallowest[direction]
+    high = polar.steepest[direction]
+    if vertical_speed(polar, direction, high) < speed:
+        return math.nan
+    if vertical_speed(polar, direction, low) >= speed:
+        return low
+    for _ in range(52):
+        middle = 0.5 * (low + high)
+        if vertical_speed(polar, direction, middle) < speed:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+class ControlPlane(NamedTuple):
+    """A u + B v + C = 0: velocities through water that cancel the flow across the line p -> q.
+
+    `lowest` [m/s] is the plane's distance from the origin, the lowest horizontal speed on it. Where q is
+    straight above p there is no plane: A and B are zero, and (u, v) is the one velocity that cancels the
+    mean flow there.
+    """
+
+    a: float
+    b: float
+    c: float
+    lowest: float
+    u: float
+    v: float
+
+
+@njit
+def control_plane(flow, x_p, y_p, z_p, x_q, y_q, z_q, t):
+    """The control plane of a pair (design, section 3, step 3): A = dy, B = -dx, C = psi_c."""
+    a = y_q - y_p
+    b = x_p - x_q
+    length = math.hypot(a, b)
+    if length == 0.0:
+        u, v = mean_velocity(flow, x_p, y_p, z_p, z_q, t)
+        return ControlPlane(0.0, 0.0, 0.0, math.hypot(u, v), -u, -v)
+    c = stream_value(flow, x_p, y_p, z_p, x_q, y_q, z_q, t)
+    return ControlPlane(a, b, c, abs(c) / length, 0.0, 0.0)
+
+
+class Streamline(NamedTuple):
+    """The paper's method: `candidates` controls on the control line."""
+
+    candidates: int
+
+
+class Surface(NamedTuple):
+    """The paper's baseline: `candidates` controls over the whole control surface."""
+
+    candidates: int
+
+
+Steering = Streamline | Surface
+
+
+@njit
+def heading_on_line(plane, horizontal, branch):
+    """Heading of the control on the plane at a horizontal speed: V_min <= speed, branch +1 or -1.
+
+    u = (-A C + branch B S) / R, v = (-B C - branch A S) / R, S = sqrt(R Vh^2 - C^2); the paper prints the
+    same sign on both, which leaves the plane.
+    """
+    r = plane.a * plane.a + plane.b * plane.b
+    s = math.sqrt(max(0.0, r * horizontal * horizontal - plane.c * plane.c))
+    u = (-plane.a * plane.c + branch * plane.b * s) / r
+    v = (-plane.b * plane.c - branch * plane.a * s) / r
+    return math.atan2(v, u)
+
+
+def _on_line(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls):
+    plane = control_plane(flow, x_p, y_p, z_p, x_q, y_q, z_q, t)
+    if plane.lowest > polar.best_horizontal[direction]:
+        return NO_CONTROL
+    # the part of the glide range that is fast enough for the plane and for the depth
+    shallow = angle_of_horizontal_speed(polar, direction, plane.lowest, polar.shallowest[direction])
+    steep = angle_of_horizontal_speed(polar, direction, plane.lowest, polar.steepest[direction])
+    shallow = max(shallow, angle_of_vertical_speed(polar, direction, slowest))
+    if not shallow <= steep:
+        return 0
+    if plane.a == 0.0 and plane.b == 0.0:
+        count = min(2, steering.candidates)
+        controls[0] = (steep, math.atan2(plane.v, plane.u))
+        controls[count - 1] = (shallow if count == 2 else steep, math.atan2(plane.v, plane.u))
+        return count
+    count = steering.candidates
+    angles = (count + 1) // 2
+    for n in range(count):
+        # steepest first: the earliest arrival
+        angle = steep - (n // 2 + 0.5) / angles * (steep - shallow)
+        branch = 1.0 - 2.0 * (n % 2)
+        controls[n] = (angle, heading_on_line(plane, horizontal_speed(polar, direction, angle), branch))
+    return count
+
+
+def _on_surface(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls):
+    # a golden-ratio lattice: even in glide angle, even in heading, and in both together
+    steep = polar.steepest[direction]
+    span = steep - polar.shallowest[direction]
+    count = steering.candidates
+    for n in range(count):
+        turn = (n + 0.5) * GOLDEN
+        heading = 2.0 * math.pi * (turn - math.floor(turn)) - math.pi
+        controls[n] = (steep - (n + 0.5) / count * span, heading)
+    return count
+
+
+_CANDIDATES: dict[type, Callable[..., Any]] = {Streamline: _on_line, Surface: _on_surface}
+
+
+def candidate_controls(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls):
+    """Fill `controls` (candidates, 2) with (angle's magnitude, heading) [rad], steepest first.
+
+    `slowest` [m/s] is the vertical speed that reaches the depth at the horizon. Returns how many there
+    are, or NO_CONTROL where the lowest-speed test fails.
+    """
+    method = _CANDIDATES[type(steering)]
+    return method(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls)
+
+
+@overload(candidate_controls)
+def _candidate_controls_in_kernels(
+    steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
+):
+    return _CANDIDATES.get(getattr(steering, "instance_class", None))

@@ -1,0 +1,318 @@
+"""Flows: the horizontal current (u, v) [m/s] at (x, y, z) [m] and time t [s]; w is zero.
+
+A flow is a flat NamedTuple; `velocity(flow, x, y, z, t)` is the one way to read it. It dispatches on the
+tuple's class, at compile time inside kernels. Every class ends in the same fields: the box
+`x_lo, x_hi, y_lo, y_hi` [m] and the time span `t_lo, t_hi` [s] in which the flow is known, an upper bound
+`max_speed` [m/s], and `length_scale` [m], over which it varies.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import overload
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.uintp]
+
+
+class Uniform(NamedTuple):
+    """The same current everywhere: u, v [m/s]."""
+
+    u: float
+    v: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+class Vortices(NamedTuple):
+    """A sum of Gaussian vortices with a Gaussian depth profile; six arrays of shape (n,)."""
+
+    x: Array
+    y: Array
+    radius: Array
+    speed: Array
+    depth: Array
+    thickness: Array
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+class Gyre(NamedTuple):
+    """Shadden's double gyre, steady where epsilon is 0; a single gyre is half of it."""
+
+    x_origin: float
+    y_origin: float
+    length: float
+    amplitude: float
+    epsilon: float
+    period: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+class Rankine(NamedTuple):
+    """A Rankine vortex: solid rotation within `radius` [m], 1/r outside, `speed` [m/s] at the rim."""
+
+    x: float
+    y: float
+    radius: float
+    speed: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+class Jet(NamedTuple):
+    """A uniform jet along x: `speed` [m/s] within `width` [m] about `y`, still water outside."""
+
+    y: float
+    width: float
+    speed: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+class Grid(NamedTuple):
+    """A steady field on a regular grid, trilinear: values (levels, nx, ny, 2) [m/s], z upward."""
+
+    values: Array
+    per_x: float
+    per_y: float
+    z_first: float
+    per_z: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+class OceanGrid(NamedTuple):
+    """A field on a mapped grid with its own levels and times, linear in each.
+
+    values (times, levels, ni, nj, 2) [m/s]; levels [m] rising, held beyond the ends; times [s] rising.
+    `index_map` (mx, my, 2) holds the fractional grid indices (i, j) at regular points of the local frame,
+    spaced 1/per_x, 1/per_y [m] from (x_lo, y_lo): bilinear between them, so that the file's own grid is
+    read without resampling. `level_slot` and `time_slot` hold, for even slots of z and t, the last index
+    at or below the slot's start; a slot is never wider than the smallest spacing.
+    """
+
+    values: Array
+    levels: Array
+    level_slot: Index
+    slots_per_z: float
+    times: Array
+    time_slot: Index
+    slots_per_t: float
+    index_map: Array
+    per_x: float
+    per_y: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
+
+
+Flow = Uniform | Vortices | Gyre | Rankine | Jet | Grid | OceanGrid
+
+
+def _uniform(flow, x, y, z, t):
+    return flow.u, flow.v
+
+
+def _vortices(flow, x, y, z, t):
+    u = 0.0
+    v = 0.0
+    for n in range(flow.x.size):
+        dx = x - flow.x[n]
+        dy = y - flow.y[n]
+        radius = flow.radius[n]
+        dz = (-z - flow.depth[n]) / flow.thickness[n]
+        # psi = s R sqrt(e) exp(-r^2 / 2R^2) exp(-dz^2);  u = d psi/dy, v = -d psi/dx
+        spin = flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
+        u -= spin * dy
+        v += spin * dx
+    return u, v
+
+
+def _gyre(flow, x, y, z, t):
+    # psi = A sin(pi f(x, t)) sin(pi y), f = a x^2 + (1 - 2a) x, a = epsilon sin(2 pi t / T); u = -d psi/dy
+    a = flow.epsilon * math.sin(2.0 * math.pi * t / flow.period)
+    along = (x - flow.x_origin) / flow.length
+    across = math.pi * (y - flow.y_origin) / flow.length
+    f = math.pi * (a * along + 1.0 - 2.0 * a) * along
+    u = -math.pi * flow.amplitude * math.sin(f) * math.cos(across)
+    v = math.pi * flow.amplitude * math.cos(f) * math.sin(across) * (2.0 * a * (along - 1.0) + 1.0)
+    return u, v
+
+
+def _rankine(flow, x, y, z, t):
+    dx = x - flow.x
+    dy = y - flow.y
+    spin = flow.speed * flow.radius / max(flow.radius * flow.radius, dx * dx + dy * dy)
+    return -spin * dy, spin * dx
+
+
+def _jet(flow, x, y, z, t):
+    inside = abs(y - flow.y) <= 0.5 * flow.width
+    return flow.speed if inside else 0.0, 0.0
+
+
+@njit(inline="always")
+def _cell(at, count):
+    """The cell below a fractional index, held within the grid, and the weight of its upper end."""
+    # NaN (a step that left the grid) must not become an address: the comparisons send it to 0
+    held = at if at > 0.0 else 0.0
+    top = count - 1.0
+    held = held if held < top else top
+    below = min(np.intp(held), np.intp(count) - 2)
+    return np.uintp(below), held - below
+
+
+@njit(inline="always")
+def _bilinear(plane, i, j, a, b, m):
+    one = np.uintp(1)
+    low = plane[i, j, m] + b * (plane[i, j + one, m] - plane[i, j, m])
+    high = plane[i + one, j, m] + b * (plane[i + one, j + one, m] - plane[i + one, j, m])
+    return low + a * (high - low)
+
+
+@njit(inline="always")
+def _trilinear(values, i, j, k, a, b, c, m):
+    low = _bilinear(values[k], i, j, a, b, m)
+    high = _bilinear(values[k + np.uintp(1)], i, j, a, b, m)
+    return low + c * (high - low)
+
+
+@njit(inline="always")
+def _slot(at, points, slots, slots_per_unit):
+    """As `_cell`, for uneven points: even slots lead to the cell, one comparison settles it."""
+    last = np.intp(points.size) - 1
+    held = at if at > points[0] else points[0]
+    held = held if held < points[last] else points[last]
+    slot = np.uintp(min(np.intp((held - points[0]) * slots_per_unit), np.intp(slots.size) - 1))
+    below = np.intp(slots[slot])
+    below = min(below + (1 if held >= points[np.uintp(below + 1)] else 0), last - 1)
+    start = points[np.uintp(below)]
+    return np.uintp(below), (held - start) / (points[np.uintp(below + 1)] - start)
+
+
+def _grid(flow, x, y, z, t):
+    values = flow.values
+    k, c = _cell((z - flow.z_first) * flow.per_z, values.shape[0])
+    i, a = _cell((x - flow.x_lo) * flow.per_x, values.shape[1])
+    j, b = _cell((y - flow.y_lo) * flow.per_y, values.shape[2])
+    return _trilinear(values, i, j, k, a, b, c, 0), _trilinear(values, i, j, k, a, b, c, 1)
+
+
+@njit(inline="always")
+def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
+    """Fractional grid indices (i, j) at (x, y) [m], from a map as `OceanGrid` describes it."""
+    p, a = _cell((x - x_lo) * per_x, index_map.shape[0])
+    q, b = _cell((y - y_lo) * per_y, index_map.shape[1])
+    return _bilinear(index_map, p, q, a, b, 0), _bilinear(index_map, p, q, a, b, 1)
+
+
+def _ocean_grid(flow, x, y, z, t):
+    values = flow.values
+    at_i, at_j = grid_index(flow.index_map, x, y, flow.x_lo, flow.y_lo, flow.per_x, flow.per_y)
+    i, a = _cell(at_i, values.shape[2])
+    j, b = _cell(at_j, values.shape[3])
+    k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
+    n, d = _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
+    before, after = values[n], values[n + np.uintp(1)]
+    u = _trilinear(before, i, j, k, a, b, c, 0)
+    v = _trilinear(before, i, j, k, a, b, c, 1)
+    u += d * (_trilinear(after, i, j, k, a, b, c, 0) - u)
+    v += d * (_trilinear(after, i, j, k, a, b, c, 1) - v)
+    return u, v
+
+
+def _in_box(flow, x, y, t):
+    return flow.x_lo <= x <= flow.x_hi and flow.y_lo <= y <= flow.y_hi and flow.t_lo <= t <= flow.t_hi
+
+
+def _in_ocean_grid(flow, x, y, t):
+    i, j = grid_index(flow.index_map, x, y, flow.x_lo, flow.y_lo, flow.per_x, flow.per_y)
+    in_box = flow.x_lo <= x <= flow.x_hi and flow.y_lo <= y <= flow.y_hi and flow.t_lo <= t <= flow.t_hi
+    return in_box and 0.0 <= i <= flow.values.shape[2] - 1 and 0.0 <= j <= flow.values.shape[3] - 1
+
+
+_VELOCITY: dict[type, Callable[..., Any]] = {
+    Uniform: _uniform,
+    Vortices: _vortices,
+    Gyre: _gyre,
+    Rankine: _rankine,
+    Jet: _jet,
+    Grid: _grid,
+    OceanGrid: _ocean_grid,
+}
+_CONTAINS: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _in_box) | {OceanGrid: _in_ocean_grid}
+
+
+def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float]:
+    """Current (u, v) [m/s], eastward and northward in the local frame, at (x, y, z) [m] and t [s]."""
+    return _VELOCITY[type(flow)](flow, x, y, z, t)
+
+
+def contains(flow: Flow, x: float, y: float, t: float) -> bool:
+    """Whether the flow is known at (x, y) [m] and time t [s]."""
+    return _CONTAINS[type(flow)](flow, x, y, t)
+
+
+@overload(velocity)
+def _velocity_in_kernels(flow, x, y, z, t):
+    return _VELOCITY.get(getattr(flow, "instance_class", None))
+
+
+@overload(contains)
+def _contains_in_kernels(flow, x, y, t):
+    return _CONTAINS.get(getattr(flow, "instance_class", None))
+
+
+@njit
+def mean_velocity(flow, x, y, z_from, z_to, t):
+    """The 2.5-D flow of a pair: the mean of the currents at its two depths [m/s]."""
+    u_from, v_from = velocity(flow, x, y, z_from, t)
+    u_to, v_to = velocity(flow, x, y, z_to, t)
+    return 0.5 * (u_from + u_to), 0.5 * (v_from + v_to)

@@ -1,0 +1,58 @@
+"""Terrain: where a glider may be. Seabed and land, as a height of the bottom over the frame."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+
+from .flow import Array, grid_index
+
+
+class OpenWater(NamedTuple):
+    """No land and no seabed above `floor` [m, upward]."""
+
+    floor: float
+
+
+class Seabed(NamedTuple):
+    """The bottom's height [m, upward; >= 0 is land] in each cell around a grid point: shape (ni, nj).
+
+    A glider keeps `clearance` [m] above it. `index_map` as in `flow.OceanGrid`.
+    """
+
+    bottom: Array
+    clearance: float
+    index_map: Array
+    per_x: float
+    per_y: float
+    x_lo: float
+    y_lo: float
+
+
+Terrain = OpenWater | Seabed
+
+
+def _open_water(terrain, x, y, z):
+    return z >= terrain.floor
+
+
+def _seabed(terrain, x, y, z):
+    at_i, at_j = grid_index(terrain.index_map, x, y, terrain.x_lo, terrain.y_lo, terrain.per_x, terrain.per_y)
+    i = min(max(np.intp(at_i + 0.5), 0), terrain.bottom.shape[0] - 1)
+    j = min(max(np.intp(at_j + 0.5), 0), terrain.bottom.shape[1] - 1)
+    bottom = terrain.bottom[i, j]
+    return bottom < 0.0 and z >= bottom + terrain.clearance
+
+
+_ALLOWED: dict[type, Callable[..., Any]] = {OpenWater: _open_water, Seabed: _seabed}
+
+
+def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
+    """Whether a glider may be at (x, y, z) [m]."""
+    return _ALLOWED[type(terrain)](terrain, x, y, z)
+
+
+@overload(allowed)
+def _allowed_in_kernels(terrain, x, y, z):
+    return _ALLOWED.get(getattr(terrain, "instance_class", None))
