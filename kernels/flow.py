@@ -15,6 +15,8 @@ from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from .cache import entry_point
+
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
 
@@ -316,3 +318,12 @@ def mean_velocity(flow, x, y, z_from, z_to, t):
     u_from, v_from = velocity(flow, x, y, z_from, t)
     u_to, v_to = velocity(flow, x, y, z_to, t)
     return 0.5 * (u_from + u_to), 0.5 * (v_from + v_to)
+
+
+@entry_point()
+def velocities(flow, x, y, z, t):
+    """`velocity` at many points: x, y, z, t of shape (n,), result (n, 2) [m/s]; for callers from Python."""
+    uv = np.empty((x.size, 2))
+    for n in range(x.size):
+        uv[n] = velocity(flow, x[n], y[n], z[n], t[n])
+    return uv

@@ -1,0 +1,136 @@
+"""The command line. Each command's body is one library call; nothing heavy is loaded before it is needed."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .errors import InputError
+
+
+class Place(click.ParamType):
+    """Numbers with commas between; `optional_text` lets a last part be a text."""
+
+    def __init__(self, name: str, texts: int = 0) -> None:
+        self.name, self.texts = name, texts
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As click asks."""
+        parts = str(value).split(",")
+        try:
+            numbers = tuple(float(part) for part in parts[:3])
+        except ValueError:
+            numbers = ()
+        if len(numbers) != 3 or len(parts) > 3 + self.texts:
+            self.fail(f"{value!r} is not {self.name}: numbers with commas between, no blanks")
+        return (*numbers, *parts[3:])
+
+
+def _write_json(value: Any) -> None:
+    click.echo(json.dumps(value, indent=1))
+
+
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
+ROADMAP = click.argument("roadmap", type=click.Path(path_type=Path))
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="glider-stream")
+def cli() -> None:
+    """Plan underwater glider routes in ocean currents."""
+
+
+@cli.command()
+@click.argument("scenario")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="The roadmap file to write.")
+@click.option("--threads", type=int, help="Threads to use; all cores if not given.")
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a scenario key.")
+def build(scenario: str, output: Path, threads: int | None, overrides: tuple[str, ...]) -> None:
+    """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one."""
+    from . import planner
+    from .progress import reporter
+
+    with reporter("build") as progress:
+        roadmap = planner.build(scenario, output, threads=threads, overrides=overrides, progress=progress)
+    click.echo(f"{roadmap}\n  file:   {output}")
+
+
+@cli.command()
+@ROADMAP
+@click.option("--start", type=Place("X,Y,Z"), help="Metres, z upward; LON,LAT,DEPTH in a geographic scenario.")
+@click.option("--goal", type=Place("X,Y,Z"), help="As --start.")
+@click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), help="A route file.")
+def query(roadmap: Path, start: Any, goal: Any, outputs: tuple[Path, ...]) -> None:
+    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
+    from . import planner
+
+    path = planner.query(roadmap, start, goal, outputs)
+    click.echo(path, err=not path.found)
+    if not path.found:
+        sys.exit(1)
+
+
+@cli.command()
+@ROADMAP
+@JSON
+def info(roadmap: Path, as_json: bool) -> None:
+    """Say what ROADMAP holds."""
+    from . import planner
+
+    road = planner.info(roadmap)
+    if as_json:
+        _write_json(road.as_dict())
+    else:
+        click.echo(road)
+
+
+@cli.command()
+@ROADMAP
+@click.argument("path", required=False, type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="PNG, SVG or PDF.")
+@click.option("--depth", "depths", multiple=True, type=float, help="A depth [m] to draw the current at.")
+def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...]) -> None:
+    """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
+    from . import planner
+
+    planner.plot(roadmap, path, output, depths or None)
+    click.echo(output)
+
+
+@cli.command()
+@click.argument("currents", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--at", multiple=True, type=Place("LON,LAT,DEPTH[,TIME]", texts=1), help="Sample the current here, as planned with."
+)
+@JSON
+def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> None:
+    """Say what the current files CURRENTS hold, and what the planner takes for what."""
+    from .describe import describe
+
+    description = describe(currents, [(*place, None)[:4] for place in at])
+    if as_json:
+        _write_json(description.as_dict())
+    else:
+        click.echo(description)
+
+
+def main() -> None:
+    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
+    try:
+        cli(standalone_mode=False)
+    except InputError as error:
+        _refuse(str(error))
+    except click.ClickException as error:
+        _refuse(error.format_message())
+    except OSError as error:
+        _refuse(f"{error.filename or 'a file'}: {error.strerror or error}")
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("glider-stream: stopped", err=True)
+        sys.exit(130)
+
+
+def _refuse(sentence: str) -> None:
+    click.echo(f"glider-stream: {' '.join(sentence.split())}", err=True)
+    sys.exit(2)

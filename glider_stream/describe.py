@@ -1,0 +1,182 @@
+"""What a current file holds and what the planner takes for what, before anyone trusts a route."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .frame import MAX_SCALE_ERROR, LocalFrame
+from .ocean import Names, OceanFile, divergence_ratio, read_currents, sample
+from .ocean_flow import EARTH
+
+Place = tuple[float, float, float | None, str | None]
+
+DEPTHS = (0.0, 50.0, 200.0, 500.0, 1000.0, 2000.0)
+"""Depths [m] whose nearest levels are spoken of."""
+NEARLY_FREE = 0.35
+"""Up to this ratio of divergence to vorticity a field is mesoscale; coastal ones begin near 0.45."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One depth [m]: greatest and rms speed [m/s], and divergence over vorticity."""
+
+    depth: float
+    max_speed: float
+    rms_speed: float
+    divergence_ratio: float | None
+
+
+@dataclass(frozen=True)
+class Point:
+    """A place and time, and the current there [m/s]; None where there is no water or no data."""
+
+    lon: float
+    lat: float
+    depth: float | None
+    time: str | None
+    u_east: float | None
+    v_north: float | None
+
+
+@dataclass(frozen=True)
+class Description:
+    """A file's currents in a few numbers; `str` says them to people, `as_dict` to programs."""
+
+    file: OceanFile
+    levels: tuple[Level, ...]
+    divergence_ratio: float | None
+    frame_error: float
+    points: tuple[Point, ...]
+
+    @property
+    def spacing(self) -> tuple[float, float, float, float]:
+        """Median spacing in longitude and latitude [degrees], then in both [km], at mid-latitude."""
+        lon, lat = (float(np.median(np.diff(axis))) for axis in (self.file.lon, self.file.lat))
+        km = np.radians(1.0) * EARTH / 1000
+        middle = np.radians((self.file.lat[0] + self.file.lat[-1]) / 2)
+        return lon, lat, float(lon * km * np.cos(middle)), float(lat * km)
+
+    @property
+    def land(self) -> float:
+        """Share of columns that are dry at the top level."""
+        return float(1 - self.file.wet[0].mean())
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        file, spacing = self.file, self.spacing
+        return {
+            "file": file.name,
+            "took": file.took,
+            "lon": [float(file.lon[0]), float(file.lon[-1])],
+            "lat": [float(file.lat[0]), float(file.lat[-1])],
+            "shape": dict(zip(("time", "depth", "lat", "lon"), file.u.shape, strict=True)),
+            "spacing_degrees": list(spacing[:2]),
+            "spacing_km": list(spacing[2:]),
+            "times": None if file.times is None else [f"{t}Z" for t in file.times.astype("datetime64[s]")],
+            "depths_m": None if file.surface else [float(depth) for depth in file.depth],
+            "land_share": self.land,
+            "levels": [
+                {
+                    "depth_m": level.depth,
+                    "max_speed": level.max_speed,
+                    "rms_speed": level.rms_speed,
+                    "divergence_ratio": level.divergence_ratio,
+                }
+                for level in self.levels
+            ],
+            "divergence_ratio": self.divergence_ratio,
+            "frame_scale_error": self.frame_error,
+            "notes": list(file.notes),
+            "points": [dict(vars(point)) for point in self.points],
+        }
+
+    def __str__(self) -> str:
+        file, (dlon, dlat, east, north) = self.file, self.spacing
+        nt, nz, ny, nx = file.u.shape
+        lines = [file.name]
+        lines += [f"  {key:<12}{what}" for key, what in file.took.items()]
+        lines.append(f"  extent      lon {file.lon[0]:.5g} to {file.lon[-1]:.5g}, ")
+        lines[-1] += f"lat {file.lat[0]:.5g} to {file.lat[-1]:.5g}; {100 * self.land:.0f} % land"
+        lines.append(f"  grid        {nx} x {ny} points, every {dlon:.4g} x {dlat:.4g} degrees")
+        lines[-1] += f", {east:.3g} x {north:.3g} km"
+        lines.append(f"  times       {file.time_range}" + (f", {nt} of them" if nt > 1 else ""))
+        levels = "not said" if file.surface else f"{file.depth[0]:.4g} to {file.depth[-1]:.6g} m, {nz} levels"
+        lines.append(f"  depths      {levels}")
+        for level in self.levels:
+            speeds = f"at most {level.max_speed:.2f} m/s, rms {level.rms_speed:.2f} m/s"
+            lines.append(f"  at {level.depth:<9.4g}{speeds}{_ratio(level.divergence_ratio)}")
+        lines.append(f"  divergence  {self._meaning()}")
+        lines.append(f"  frame       {self._frame()}")
+        lines += [f"  note        {note}" for note in file.notes]
+        for point in self.points:
+            where = f"{point.lon:g}, {point.lat:g}"
+            where += "" if point.depth is None else f", {point.depth:g} m"
+            where += "" if point.time is None else f", {point.time}"
+            if point.u_east is None or point.v_north is None:
+                lines.append(f"  {where}: no water, or no data")
+            else:
+                lines.append(f"  {where}: {point.u_east:+.5f} m/s east, {point.v_north:+.5f} m/s north")
+        return "\n".join(lines)
+
+    def _meaning(self) -> str:
+        ratio = self.divergence_ratio
+        if ratio is None:
+            return "unknown: no wet cell has wet neighbours that move"
+        if ratio <= NEARLY_FREE:
+            return f"{ratio:.2f} of vorticity: small, the stream value hardly depends on the path"
+        return (
+            f"{ratio:.2f} of vorticity: large, the stream value depends on the path; "
+            "controls from it miss more often, those from the flow map do not"
+        )
+
+    def _frame(self) -> str:
+        if self.frame_error > MAX_SCALE_ERROR:
+            return "the whole extent is too wide for one flat frame: plan in a part of it"
+        return (
+            f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
+        )
+
+
+def _ratio(ratio: float | None) -> str:
+    return "" if ratio is None else f", divergence {ratio:.2f} of vorticity"
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _level(file: OceanFile, k: int) -> Level:
+    squared = file.u[:, k].astype(np.float64) ** 2 + file.v[:, k].astype(np.float64) ** 2
+    squared = squared[np.isfinite(squared)]
+    most, mean = (float(squared.max()), float(squared.mean())) if squared.size else (0.0, 0.0)
+    return Level(float(file.depth[k]), most**0.5, mean**0.5, _finite(divergence_ratio(file, k)))
+
+
+def describe(
+    files: str | Path | Sequence[str | Path], at: Sequence[Place] = (), names: Names | None = None
+) -> Description:
+    """What the current files hold, and the current at some places: (lon, lat, depth [m], time or None).
+
+    The values are those that a planner reads. A file with several times needs the time of each place.
+    """
+    file = read_currents(files, names)
+    points = []
+    for place in at:
+        current = sample(file, *place)
+        points.append(Point(*place, *((None, None) if current is None else current)))
+    near = dict.fromkeys(
+        int(np.abs(file.depth - d).argmin()) for d in (*DEPTHS, file.depth[-1]) if d <= file.depth[-1]
+    )
+    lon, lat = (float(file.lon[0]), float(file.lon[-1])), (float(file.lat[0]), float(file.lat[-1]))
+    wide = lon[1] - lon[0] >= 180
+    return Description(
+        file=file,
+        levels=tuple(_level(file, k) for k in near),
+        divergence_ratio=_finite(divergence_ratio(file)),
+        # half around the globe the stereographic scale has long left every bound
+        frame_error=1.0 if wide else LocalFrame.over(lon, lat).scale_error(lon, lat),
+        points=tuple(points),
+    )

@@ -1,0 +1,138 @@
+"""Edge evaluation for callers from Python: casts arrays, checks them, calls the kernels."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .kernels import control, edges, flow, motion, terrain
+from .kernels.edges import Edge, Status
+from .settings import require
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StreamlineMethod:
+    """The paper's method: controls on the control line; `candidates` counts those integrated."""
+
+    candidates: int
+
+    def __post_init__(self) -> None:
+        require(self.candidates >= 1, f"`steering.candidates` must be at least 1; got {self.candidates}")
+
+    def kernel(self) -> control.Steering:
+        """As the kernels read it."""
+        return control.Streamline(self.candidates)
+
+
+@dataclass(frozen=True)
+class SurfaceMethod(StreamlineMethod):
+    """The paper's baseline: controls over the whole control surface."""
+
+    def kernel(self) -> control.Steering:
+        """As the kernels read it."""
+        return control.Surface(self.candidates)
+
+
+METHODS: dict[str, type[StreamlineMethod]] = {"streamline": StreamlineMethod, "surface": SurfaceMethod}
+
+
+@dataclass(frozen=True)
+class IntegrationSettings:
+    """`steps` RK4 steps of `dt` [s] make the horizon; a miss below `tolerance` [m] is a hit."""
+
+    dt: float
+    steps: int
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        require(self.dt > 0, f"`integration.dt` must be above 0 s; got {self.dt:g}")
+        require(self.steps >= 1, f"`integration.steps` must be at least 1; got {self.steps}")
+        require(self.tolerance > 0, f"`integration.tolerance` must be above 0 m; got {self.tolerance:g}")
+
+    def kernel(self) -> motion.Integration:
+        """As the kernels read it."""
+        return motion.Integration(self.dt, self.steps, self.tolerance)
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """Everything that decides an edge but its ends: flow, terrain, glide polar, steering, integration."""
+
+    flow: flow.Flow
+    terrain: terrain.Terrain
+    polar: control.Polar
+    steering: StreamlineMethod
+    integration: IntegrationSettings
+
+    def connect(
+        self, position: ArrayLike, departure: ArrayLike, source: ArrayLike, indptr: ArrayLike, target: ArrayLike
+    ) -> Array:
+        """Outcomes of all pairs (source[n], target[indptr[n]:indptr[n + 1]]): rows in the order of `Edge`.
+
+        position (nodes, 3) [m]; departure (nodes,) [s] or one for all; source (n,), indptr (n + 1,),
+        target (pairs,) node numbers. Status first (see `Status`); time [s], cost, glide angle, heading [rad],
+        speed [m/s], miss [m], NaN where the pair is not connected.
+        """
+        nodes = np.ascontiguousarray(position, np.float64)
+        require(nodes.ndim == 2 and nodes.shape[1] == 3, f"`position` must have shape (n, 3); got {nodes.shape}")
+        require(bool(np.isfinite(nodes).all()), "`position` must be finite; got NaN or infinity")
+        departs = np.ascontiguousarray(np.broadcast_to(np.asarray(departure, np.float64), len(nodes)))
+        sources, rows, targets = (np.ascontiguousarray(a, np.int64) for a in (source, indptr, target))
+        fits = rows.size == sources.size + 1 and rows[0] == 0 and rows[-1] == targets.size
+        require(bool(fits and (np.diff(rows) >= 0).all()), "`indptr` must rise from 0 to the number of targets")
+        for name, index in (("source", sources), ("target", targets)):
+            inside = index.size == 0 or (0 <= index.min() and index.max() < len(nodes))
+            require(inside, f"`{name}` must hold node numbers below {len(nodes)}; got others")
+        steering, integration = self.steering.kernel(), self.integration.kernel()
+        result: Array = edges.connect_all(
+            self.flow, self.terrain, self.polar, steering, integration, nodes, departs, sources, rows, targets
+        )
+        return result
+
+    def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
+        """The outcome of one pair of points (3,) [m]."""
+        row = self.connect([start, goal], departure, [0], [0, 1], [1])[0]
+        return Edge(int(row[0]), *(float(value) for value in row[1:]))
+
+    def trace(self, start: ArrayLike, edge: Edge, departure: float) -> Array:
+        """The path of an edge from `start` (3,) [m]: rows [t, x, y, z] to its closest approach."""
+        x, y, z = (float(value) for value in np.asarray(start, np.float64))
+        along = edge.speed * math.cos(edge.glide_angle)
+        u, v = along * math.cos(edge.heading), along * math.sin(edge.heading)
+        w = edge.speed * math.sin(edge.glide_angle)
+        rows: Array = motion.traced(self.flow, x, y, z, departure, u, v, w, edge.time, self.integration.dt)
+        return rows
+
+    def allowed(self, points: Array, t: float = 0.0) -> NDArray[np.bool_]:
+        """Which points (n, 3) [m] lie in the flow and in open water at time t [s]."""
+        return np.array(
+            [
+                flow.contains(self.flow, x, y, t) and terrain.allowed(self.terrain, x, y, z)
+                for x, y, z in np.asarray(points, np.float64)
+            ],
+            dtype=bool,
+        )
+
+
+def count_statuses(outcomes: Array) -> dict[str, int]:
+    """How many pairs ended in each status, by its name in lower case."""
+    counts = np.bincount(outcomes[:, 0].astype(np.int64), minlength=len(Status))
+    return {status.name.lower(): int(counts[status]) for status in Status}
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[int]:
+    """Run kernels on `count` threads (all cores if None); yields the number."""
+    most, before = numba.config.NUMBA_NUM_THREADS, numba.get_num_threads()
+    require(count is None or 1 <= count <= most, f"`threads` must be from 1 to {most} on this machine; got {count}")
+    numba.set_num_threads(count or most)
+    try:
+        yield count or most
+    finally:
+        numba.set_num_threads(before)

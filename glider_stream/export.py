@@ -1,0 +1,30 @@
+"""Route files: a path in the forms that other programs read."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path as File
+
+from .query import Path
+from .settings import require
+from .store import replacing
+
+
+def _json(path: Path) -> str:
+    return json.dumps(path.as_dict(), indent=1) + "\n"
+
+
+EXPORTS: dict[str, Callable[[Path], str]] = {".json": _json}
+
+
+def check_export(file: str | File) -> None:
+    """InputError unless the file's ending names a known form."""
+    suffix = File(file).suffix
+    known = ", ".join(EXPORTS)
+    require(suffix in EXPORTS, f"the route file {file} must end in one of: {known}; got {suffix or 'no ending'!r}")
+
+
+def export_path(path: Path, file: str | File) -> None:
+    """Write a path in the form that the file's ending names."""
+    check_export(file)
+    with replacing(File(file)) as temporary:
+        temporary.write_text(EXPORTS[File(file).suffix](path), encoding="utf-8")

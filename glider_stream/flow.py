@@ -1,0 +1,326 @@
+"""Flows of a scenario: analytic fields, checked and turned into what the kernels read."""
+
+import hashlib
+import itertools
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernels import flow as kernel
+from .settings import require
+
+Range = tuple[float, float]
+Array = NDArray[np.float64]
+
+ALWAYS = (-math.inf, math.inf)
+MAX_SAMPLES = 100_000_000
+"""Largest grid [points] that `sampled` makes: 1.6 GB."""
+
+
+def check_range(bounds: Range, where: str) -> None:
+    """InputError unless lo < hi."""
+    require(bounds[0] < bounds[1], f"`{where}` must rise; got [{bounds[0]:g}, {bounds[1]:g}]")
+
+
+def require_positive(value: float, where: str) -> None:
+    """InputError unless the value is above zero."""
+    require(value > 0, f"`{where}` must be above 0; got {value:g}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalyticFlow:
+    """What every analytic flow may say: the box `x`, `y` [m] in which it is known, and `sampled`.
+
+    `sampled` = [dx, dy, dz] [m] reads the flow once on a grid, trilinear between its points.
+    """
+
+    x: Range | None = None
+    y: Range | None = None
+    sampled: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for name, bounds in (("x", self.x), ("y", self.y)):
+            if bounds is not None:
+                check_range(bounds, f"flow.{name}")
+        for spacing in self.sampled or ():
+            require_positive(spacing, "flow.sampled")
+        self.check()
+
+    def check(self) -> None:
+        """Check the flow's own values."""
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """The kernel's class, and its fields that are not at their usual values; `depth` [m] of interest."""
+        raise NotImplementedError
+
+    def kernel(self, z: Range) -> kernel.Flow:
+        """The flow as the kernels read it; `z` [m] is the range of heights of interest."""
+        kind, values = self.fields((-z[1], -z[0]))
+        (x_lo, x_hi), (y_lo, y_hi) = self.x or ALWAYS, self.y or ALWAYS
+        usual = {"x_lo": x_lo, "x_hi": x_hi, "y_lo": y_lo, "y_hi": y_hi, "t_lo": -math.inf, "t_hi": math.inf}
+        result: kernel.Flow = kind(**usual | values)
+        return result
+
+
+@dataclass(frozen=True)
+class Uniform(AnalyticFlow):
+    """The same current everywhere: u east, v north [m/s]."""
+
+    u: float
+    v: float
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """As AnalyticFlow says."""
+        speed = math.hypot(self.u, self.v)
+        return kernel.Uniform, {"u": self.u, "v": self.v, "max_speed": speed, "length_scale": math.inf}
+
+
+@dataclass(frozen=True)
+class Vortex:
+    """psi = speed R sqrt(e) exp(-r^2 / 2R^2) exp(-((depth - depth_0) / H)^2); > 0 counter-clockwise."""
+
+    x: float
+    y: float
+    radius: float
+    speed: float
+    depth: float = 0.0
+    thickness: float | None = None
+
+    def __post_init__(self) -> None:
+        require_positive(self.radius, "flow.vortex.radius")
+        if self.thickness is not None:
+            require_positive(self.thickness, "flow.vortex.thickness")
+
+
+@dataclass(frozen=True)
+class Vortices(AnalyticFlow):
+    """A sum of vortices; one without `thickness` is the same at all depths."""
+
+    vortex: tuple[Vortex, ...]
+
+    def check(self) -> None:
+        """At least one vortex."""
+        require(len(self.vortex) > 0, "`flow.vortex` must hold at least one vortex; got none")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """As AnalyticFlow says."""
+        columns = {
+            name: np.array([getattr(one, name) for one in self.vortex])
+            for name in ("x", "y", "radius", "speed", "depth")
+        }
+        columns["thickness"] = np.array([one.thickness or math.inf for one in self.vortex])
+        bound = _speed_bound(columns, depth)
+        return kernel.Vortices, columns | {
+            "max_speed": bound,
+            "length_scale": float(columns["radius"].min()),
+        }
+
+
+def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices: int = 8) -> float:
+    """An upper bound of the summed speed [m/s]: per cell, the sum of each vortex's own maximum in it."""
+    radius, speed = vortex["radius"], np.abs(vortex["speed"])
+
+    def rim(r: Array) -> Array:
+        return np.asarray(speed[:, None, None] * r * np.exp(0.5 - 0.5 * r * r))
+
+    edges = [
+        np.linspace((vortex[a] - 3 * radius).min(), (vortex[a] + 3 * radius).max(), cells + 1) for a in "xy"
+    ]
+    # distances from each centre, in radii: nearest and farthest point of each cell
+    spans = []
+    for axis, line in zip("xy", edges, strict=True):
+        low = (line[:-1] - vortex[axis][:, None]) / radius[:, None]
+        high = (line[1:] - vortex[axis][:, None]) / radius[:, None]
+        far = np.maximum(np.abs(low), np.abs(high))
+        near = np.where((low <= 0) & (high >= 0), 0.0, np.minimum(np.abs(low), np.abs(high)))
+        spans.append((near, far))
+    near = np.hypot(spans[0][0][:, :, None], spans[1][0][:, None, :])
+    far = np.hypot(spans[0][1][:, :, None], spans[1][1][:, None, :])
+    inside = np.where((near <= 1) & (far >= 1), speed[:, None, None], np.maximum(rim(near), rim(far)))
+    # outside the box every centre is at least three radii away
+    outside = float(rim(np.full((radius.size, 1, 1), 3.0)).sum())
+    worst = 0.0
+    for top, bottom in itertools.pairwise(np.linspace(depth[0], depth[1], slices + 1)):
+        off = np.maximum(np.maximum(top - vortex["depth"], vortex["depth"] - bottom), 0) / vortex["thickness"]
+        worst = max(worst, float((np.exp(-off * off)[:, None, None] * inside).sum(axis=0).max()))
+    return max(worst, outside) * (1 + 1e-12)
+
+
+@dataclass(frozen=True)
+class DoubleGyre(AnalyticFlow):
+    """Shadden's double gyre: psi = A sin(pi f) sin(pi y), f = a x^2 + (1 - 2a) x, a = epsilon sin(2 pi t/T).
+
+    x and y in units of `length` [m] from `origin`, over [0, 2] x [0, 1]; `amplitude` A [m/s]: the greatest
+    speed of the steady field is pi A. The published case is A = 0.1, epsilon = 0.25, T = 10, length = 1
+    (Shadden, Lekien, Marsden 2005, Physica D 212); epsilon = 0 is steady. `period` T [s].
+    """
+
+    amplitude: float
+    length: float
+    epsilon: float
+    period: float = field(metadata={"missing": "the period [s] of the gyres' swing; any above 0 if steady"})
+    origin: tuple[float, float] = (0.0, 0.0)
+    cells = 2
+
+    def check(self) -> None:
+        """Positive length and period; 0 <= epsilon < 1/2, so that f maps the box onto itself."""
+        require_positive(self.length, "flow.length")
+        require_positive(self.period, "flow.period")
+        require(0 <= self.epsilon < 0.5, f"`flow.epsilon` must be in [0, 0.5); got {self.epsilon:g}")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """As AnalyticFlow says; the gyres' walls are streamlines, and the flow ends there."""
+        x, y = self.origin
+        box_x, box_y = self.x or (x, x + self.cells * self.length), self.y or (y, y + self.length)
+        stretch = 1 + 2 * self.epsilon * max(abs((b - x) / self.length - 1) for b in box_x)
+        return kernel.Gyre, {
+            "x_origin": x,
+            "y_origin": y,
+            "length": self.length,
+            "amplitude": self.amplitude,
+            "epsilon": self.epsilon,
+            "period": self.period,
+            "x_lo": box_x[0],
+            "x_hi": box_x[1],
+            "y_lo": box_y[0],
+            "y_hi": box_y[1],
+            "max_speed": math.pi * abs(self.amplitude) * stretch,
+            "length_scale": self.length / 4,
+        }
+
+
+@dataclass(frozen=True)
+class SingleGyre(DoubleGyre):
+    """One steady gyre over [0, 1] x [0, 1]: psi = A sin(pi x) sin(pi y), lengths in units of `length`."""
+
+    epsilon: float = field(default=0.0, init=False)
+    period: float = field(default=1.0, init=False)
+    cells = 1
+
+
+@dataclass(frozen=True)
+class Rankine(AnalyticFlow):
+    """A Rankine vortex about (x_centre, y_centre): solid rotation within `radius` [m], `speed` at its rim."""
+
+    x_centre: float
+    y_centre: float
+    radius: float
+    speed: float
+
+    def check(self) -> None:
+        """Positive radius."""
+        require_positive(self.radius, "flow.radius")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """As AnalyticFlow says."""
+        return kernel.Rankine, {
+            "x": self.x_centre,
+            "y": self.y_centre,
+            "radius": self.radius,
+            "speed": self.speed,
+            "max_speed": abs(self.speed),
+            "length_scale": self.radius / 2,
+        }
+
+
+@dataclass(frozen=True)
+class Jet(AnalyticFlow):
+    """A uniform jet along x: `speed` [m/s] within `width` [m] about `y_centre`, still water beside it."""
+
+    y_centre: float
+    width: float
+    speed: float
+
+    def check(self) -> None:
+        """Positive width."""
+        require_positive(self.width, "flow.width")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """As AnalyticFlow says."""
+        return kernel.Jet, {
+            "y": self.y_centre,
+            "width": self.width,
+            "speed": self.speed,
+            "max_speed": abs(self.speed),
+            "length_scale": self.width / 8,
+        }
+
+
+FLOWS: dict[str, type[AnalyticFlow]] = {
+    "uniform": Uniform,
+    "vortices": Vortices,
+    "double-gyre": DoubleGyre,
+    "single-gyre": SingleGyre,
+    "rankine": Rankine,
+    "jet": Jet,
+}
+
+
+def is_steady(flow: kernel.Flow) -> bool:
+    """Whether the flow is the same at all times."""
+    if isinstance(flow, kernel.Gyre):
+        return flow.epsilon == 0
+    return math.isinf(flow.t_lo)
+
+
+def sample_flow(flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range) -> kernel.Grid:
+    """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
+    require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
+    box = [(max(x[0], flow.x_lo), min(x[1], flow.x_hi)), (max(y[0], flow.y_lo), min(y[1], flow.y_hi)), z]
+    counts = [max(2, math.ceil((hi - lo) / step - 1e-9) + 1) for (lo, hi), step in zip(box, spacing, strict=True)]
+    require(
+        math.prod(counts) <= MAX_SAMPLES,
+        f"`flow.sampled` = {list(spacing)} makes {math.prod(counts):,} points, more than {MAX_SAMPLES:,}; widen it",
+    )
+    lines = [np.linspace(lo, hi, n) for (lo, hi), n in zip(box, counts, strict=True)]
+    zz, xx, yy = (a.ravel() for a in np.meshgrid(lines[2], lines[0], lines[1], indexing="ij"))
+    values = kernel.velocities(flow, xx, yy, zz, np.zeros(zz.size))
+    values = values.reshape(counts[2], counts[0], counts[1], 2)
+    steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
+    return kernel.Grid(
+        values=values,
+        per_x=1 / steps[0],
+        per_y=1 / steps[1],
+        z_first=z[0],
+        per_z=1 / steps[2],
+        x_lo=box[0][0],
+        x_hi=box[0][1],
+        y_lo=box[1][0],
+        y_hi=box[1][1],
+        t_lo=flow.t_lo,
+        t_hi=flow.t_hi,
+        max_speed=float(np.hypot(values[..., 0], values[..., 1]).max()),
+        length_scale=max(flow.length_scale / 2, steps[0], steps[1]) if math.isfinite(flow.length_scale) else steps[0],
+    )
+
+
+def flow_sha256(flow: kernel.Flow) -> str:
+    """A digest of everything the kernels can read of a flow."""
+    text = hashlib.sha256(type(flow).__name__.encode())
+    for name, value in zip(flow._fields, flow, strict=True):
+        array = np.ascontiguousarray(value)
+        text.update(f"\n{name} {array.dtype} {array.shape}\n".encode() + array.tobytes())
+    return text.hexdigest()
+
+
+def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096) -> float:
+    """Rms horizontal divergence over rms vorticity in a box [m]; the stream value needs it small.
+
+    0 where the flow has neither; inf where it only diverges.
+    """
+    step = 1e-3 * min(flow.length_scale, x[1] - x[0], y[1] - y[0])
+    share = np.random.default_rng(0).random((3, count))
+    lo = np.array([x[0] + step, y[0] + step, z[0]])
+    hi = np.array([x[1] - step, y[1] - step, z[1]])
+    px, py, pz = lo[:, None] + share * (hi - lo)[:, None]
+    when = np.full(count, t)
+    by_x = kernel.velocities(flow, px + step, py, pz, when) - kernel.velocities(flow, px - step, py, pz, when)
+    by_y = kernel.velocities(flow, px, py + step, pz, when) - kernel.velocities(flow, px, py - step, pz, when)
+    divergence = float(np.sqrt(np.mean((by_x[:, 0] + by_y[:, 1]) ** 2)))
+    vorticity = float(np.sqrt(np.mean((by_x[:, 1] - by_y[:, 0]) ** 2)))
+    if divergence == 0:
+        return 0.0
+    return divergence / vorticity if vorticity > 0 else math.inf

@@ -1,0 +1,343 @@
+"""Gliders: drag models from the scenario's [glider] table, and the polar that the kernels fly by.
+
+Signs: the glide angle gamma < 0 dives, > 0 climbs; the net mass is > 0 heavy, < 0 light; the angle of attack
+is > 0 in a dive, < 0 in a climb, so that pitch = gamma + alpha is shallower than the path. A new model is one
+dataclass and one row of MODELS.
+"""
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError
+from .kernels.control import CLIMB, DIVE, Polar
+from .kernels.flow import Array
+from .settings import from_kinds, from_table, require
+
+POLAR_TOLERANCE = 1e-7  # relative error of the table, linear between its angles
+POLAR_STEPS = (256, 65536)  # fewest and most steps of the table
+SOLVE_TOLERANCE = 1e-13  # of ln q
+SOLVE_STEPS = 100  # 4 to 7 do for a usable range, 20 within 1e-12 rad of the limit
+ROUNDING = 8 * np.finfo(np.float64).eps  # more than the kernels' interpolation errs by
+
+# the papers' symbols, accepted for the keys
+SYMBOLS = {
+    **{"K_D0": "drag_0", "K_D": "drag_alpha2", "K_L0": "lift_0", "K_L": "lift_alpha"},
+    **{"off": "offset", "m_b_max": "ballast_max", "g": "gravity"},
+    **{"a": "lift", "b": "drag", "c": "induced_drag", "s": "drag_exponent", "rho0": "density", "l": "length"},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glider:
+    """What the models share: `angles` [degrees], the range of |gamma|, and `gravity` [m/s^2]."""
+
+    angles: tuple[float, float]
+    gravity: float
+    name: str = "glider"
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        low, high = self.angles
+        for phase, limit in zip(("dive", "climb"), np.degrees(np.abs(self.feasible_limits())), strict=True):
+            require(
+                limit < low < high < 90.0,
+                f"`glider.angles` must rise from above {limit:.4f} degrees, the limit of a steady {phase}, "
+                f"to below 90; got {[low, high]}",
+            )
+
+    def __str__(self) -> str:
+        table = polar(self)
+        phases = []
+        for row in (DIVE, CLIMB):
+            slow, fast = table.speed[row, [0, -1]] * np.sin([table.shallowest[row], table.steepest[row]])
+            angle = math.degrees(table.best_angle[row])
+            best = f"{table.best_horizontal[row]:.3f} m/s horizontal at {angle:.1f} degrees"
+            phases.append(f"{best}, {slow:.3f} to {fast:.3f} m/s vertical")
+        same = phases[DIVE] == phases[CLIMB]
+        return f"{self.name}: " + (phases[DIVE] if same else f"dive {phases[DIVE]}; climb {phases[CLIMB]}")
+
+    def _positive(self, *names: str) -> None:
+        for name in names:
+            value = getattr(self, name)
+            require(value > 0.0, f"`glider.{name}` must be greater than 0; got {value}")
+
+    def speed(self, gamma: Array | float) -> Array:
+        """Speed through water V [m/s] at the signed glide angle [rad]; NaN where there is no steady glide."""
+        return self._glide(self._feasible(gamma))[0]
+
+    def angle_of_attack(self, gamma: Array | float) -> Array:
+        """Angle of attack alpha [rad] at the signed glide angle [rad]; NaN where there is no steady glide."""
+        return self._glide(self._feasible(gamma))[1]
+
+    def net_mass(self, gamma: Array | float) -> Array:
+        """Net mass m0 [kg] of the phase: > 0 in a dive, < 0 in a climb."""
+        return np.where(np.asarray(gamma) < 0.0, *self._net_masses())
+
+    def feasible_limits(self) -> tuple[float, float]:
+        """The limits [rad]: gamma below the first dives, above the second climbs; between is no glide."""
+        raise NotImplementedError
+
+    def _net_masses(self) -> tuple[float, float]:
+        """Net mass [kg] in a dive and in a climb."""
+        raise NotImplementedError
+
+    def _glide(self, gamma: Array) -> tuple[Array, Array]:
+        """V [m/s] and alpha [rad] at feasible angles."""
+        raise NotImplementedError
+
+    def _feasible(self, gamma: Array | float) -> Array:
+        """The angles [rad], NaN for those that no steady glide has."""
+        gamma = np.asarray(gamma, dtype=np.float64)
+        dive, climb = self.feasible_limits()
+        glides = ((gamma < dive) | (gamma > climb)) & (np.abs(gamma) <= 0.5 * math.pi)
+        return np.where(glides, gamma, np.nan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyGlide(Glider):
+    """Leonard and Graver's steady glide (2001), the model of the source paper (arXiv 2005.03834).
+
+    The forces are D V^2 and L V^2 with D = K_D0 + K_D alpha^2, L = K_L0 + K_L alpha, alpha in radians:
+    `drag_0` K_D0, `lift_0` K_L0 [kg/m]; `drag_alpha2` K_D [kg/(m rad^2)]; `lift_alpha` K_L [kg/(m rad)].
+
+    The ballast is full in a dive and empty in a climb: m0 = `ballast_max` - `offset` and m0 = -`offset`
+    [kg], where `offset` = m - m_h - m_bar is the displaced mass less all that is not ballast.
+    """
+
+    drag_0: float
+    drag_alpha2: float
+    lift_0: float
+    lift_alpha: float
+    offset: float
+    ballast_max: float
+
+    def __post_init__(self) -> None:
+        self._positive("gravity", "drag_0", "drag_alpha2", "lift_alpha")
+        masses = f"`glider.offset` = {self.offset} kg, `glider.ballast_max` = {self.ballast_max} kg"
+        require(self.offset > 0.0, f"the climb has no speed: empty, the glider is not light ({masses})")
+        require(self.offset < self.ballast_max, f"the dive has no speed: full, it is not heavy ({masses})")
+        super().__post_init__()
+
+    def feasible_limits(self) -> tuple[float, float]:
+        """lim± = atan(2 (K_D/K_L) (K_L0/K_L ± sqrt((K_L0/K_L)^2 + K_D0/K_D))) [rad]."""
+        lift = self.lift_0 / self.lift_alpha
+        root = math.sqrt(lift**2 + self.drag_0 / self.drag_alpha2)
+        scale = 2.0 * self.drag_alpha2 / self.lift_alpha
+        return math.atan(scale * (lift - root)), math.atan(scale * (lift + root))
+
+    def _net_masses(self) -> tuple[float, float]:
+        return self.ballast_max - self.offset, -self.offset
+
+    def _glide(self, gamma: Array) -> tuple[Array, Array]:
+        """V = sqrt(-m0 g sin(gamma) / D), alpha the smaller root of tan(gamma) = -D/L.
+
+        The paper's forms cancel: V = sqrt(m0 g / (L cos - D sin)); alpha = (1/2) (K_L/K_D) tan(gamma)
+        (-1 + sqrt(1 - x)) with x = 4 (K_D/K_L^2) cot(gamma) F, F = K_D0 cot(gamma) + K_L0.
+        """
+        cot = np.cos(gamma) / np.sin(gamma)
+        force = self.drag_0 * cot + self.lift_0
+        x = 4.0 * self.drag_alpha2 / self.lift_alpha**2 * cot * force
+        alpha = -2.0 * force / (self.lift_alpha * (1.0 + np.sqrt(np.maximum(1.0 - x, 0.0))))
+        drag = self.drag_0 + self.drag_alpha2 * alpha**2
+        return np.sqrt(-self.net_mass(gamma) * self.gravity * np.sin(gamma) / drag), alpha
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seaglider(Glider):
+    """The University of Washington's Seaglider (Eriksen et al. 2001; basestation3).
+
+    Lift = l^2 q a alpha, drag = l^2 q (b q^s + c alpha^2) [N], q = rho0 V^2 / 2 [Pa], alpha in **degrees**:
+    `lift` a [1/degree], `drag` b [Pa^-s], `drag_exponent` s, `induced_drag` c [1/degree^2], `length` l [m],
+    `density` rho0 [kg/m^3]; `dive_volume` and `climb_volume` [cc] are the volumes short of and beyond
+    neutral buoyancy.
+    """
+
+    lift: float
+    drag: float
+    induced_drag: float
+    drag_exponent: float
+    length: float
+    density: float
+    dive_volume: float
+    climb_volume: float
+
+    def __post_init__(self) -> None:
+        self._positive("gravity", "lift", "drag", "induced_drag", "length", "density")
+        exponent = self.drag_exponent
+        require(exponent > -1.0, f"`glider.drag_exponent` must be greater than -1; got {exponent}")
+        for phase, volume in (("dive", self.dive_volume), ("climb", self.climb_volume)):
+            require(
+                volume > 0.0,
+                f"the {phase} has no speed: `glider.{phase}_volume` must be greater than 0 cc; got {volume}",
+            )
+        super().__post_init__()
+
+    def _net_masses(self) -> tuple[float, float]:
+        return 1e-6 * self.density * self.dive_volume, -1e-6 * self.density * self.climb_volume
+
+    def _forces(self, gamma: Array) -> tuple[Array, Array]:
+        """Drag and lift [N] that balance the weight W: -W sin(gamma), and W cos(gamma)."""
+        weight = self.net_mass(gamma) * self.gravity
+        return -weight * np.sin(gamma), weight * np.cos(gamma)
+
+    def _terms(self, lift: Array) -> tuple[float, Array]:
+        """B and C of drag = B q^(1+s) + C / q: alpha = lift / (l^2 a q) put into the drag."""
+        area = self.length**2
+        return area * self.drag, self.induced_drag * (lift / self.lift) ** 2 / area
+
+    def feasible_limits(self) -> tuple[float, float]:
+        """Where the drag equals its least value, (2 + s) B q^(1+s) at q^(2+s) = C / (B (1 + s)) [rad]."""
+        power = 1.0 + self.drag_exponent
+        angles = np.array([[0.0, 0.0], [0.5 * math.pi, 0.5 * math.pi]])
+        for _ in range(60):
+            middle = np.array([-0.5, 0.5]) * angles.sum(axis=0)
+            drag, lift = self._forces(middle)
+            base, induced = self._terms(lift)
+            least = (1.0 + power) * base * (induced / (base * power)) ** (power / (1.0 + power))
+            angles[np.where(drag < least, 0, 1), [DIVE, CLIMB]] = np.abs(middle)
+        return -float(angles[1, DIVE]), float(angles[1, CLIMB])
+
+    def _glide(self, gamma: Array) -> tuple[Array, Array]:
+        """V = sqrt(2 q / rho0), alpha = lift / (l^2 a q), q the larger root of B q^(1+s) + C / q = drag."""
+        drag, lift = self._forces(gamma)
+        base, induced = self._terms(lift)
+        power = 1.0 + self.drag_exponent
+        # convex in x = ln q, and begun beyond the larger root: Newton's steps cannot pass it
+        x = np.log(drag / base) / power
+        for _ in range(SOLVE_STEPS):
+            parasite, vortex = base * np.exp(power * x), induced * np.exp(-x)
+            step = (parasite + vortex - drag) / (power * parasite - vortex)
+            x = x - step
+            if not np.any(np.abs(step) > SOLVE_TOLERANCE):
+                break
+        pressure = np.exp(x)
+        alpha = np.radians(lift / (self.length**2 * self.lift * pressure))
+        return np.sqrt(2.0 * pressure / self.density), alpha
+
+
+MODELS: dict[str, type[Glider]] = {"steady-glide": SteadyGlide, "seaglider": Seaglider}
+
+PRESETS: dict[str, Glider] = {
+    "paper": SteadyGlide(
+        name="paper",
+        note="a Slocum's coefficients by Graver (2005), with the net mass that gives the source paper's "
+        "0.9 m/s horizontal; optimistic: the drag is 3.6 times below field-calibrated",
+        angles=(10.0, 45.0),
+        gravity=9.81,
+        drag_0=2.15,
+        drag_alpha2=25.0,
+        lift_0=0.0,
+        lift_alpha=132.5,
+        offset=0.464051,
+        ballast_max=0.928102,
+    ),
+    "slocum": SteadyGlide(
+        name="slocum",
+        note="a Slocum calibrated in the field (Merckelbach et al. 2019; gliderflight with C_D0 = 0.15, "
+        "S = 0.1 m^2, rho = 1024 kg/m^3), 250 cc heavy or light",
+        angles=(20.0, 45.0),
+        gravity=9.81,
+        drag_0=7.68,
+        drag_alpha2=537.2229,
+        lift_0=0.0,
+        lift_alpha=385.7546,
+        offset=0.256,
+        ballast_max=0.512,
+    ),
+    "seaglider": Seaglider(
+        name="seaglider",
+        note="the default flight model of the University of Washington's basestation3, 150 cc heavy or light",
+        angles=(15.0, 45.0),
+        gravity=9.82,
+        lift=0.003548134,
+        drag=0.011220184,
+        induced_drag=5.7e-6,
+        drag_exponent=-0.25,
+        length=1.8,
+        density=1027.5,
+        dive_volume=150.0,
+        climb_volume=150.0,
+    ),
+}
+
+
+def glider_from_table(table: Mapping[str, Any]) -> Glider:
+    """The glider of a scenario's [glider] table: `preset` and overrides, or `model` and all its keys."""
+    named: dict[str, Any] = {}
+    for key, value in table.items():
+        name = SYMBOLS.get(key, key)
+        require(name not in named, f"`glider.{name}` is given twice, by its name and by its symbol")
+        named[name] = value
+    if "preset" not in named:
+        missing = f"`glider.preset` is missing: choose from: {', '.join(PRESETS)}; or give `glider.model`"
+        require("model" in named, missing)
+        return from_kinds(MODELS, named, "glider", selector="model")
+    preset = named.pop("preset")
+    if not isinstance(preset, str) or preset not in PRESETS:
+        raise InputError(f"`glider.preset` = {preset!r} is not known; choose from: {', '.join(PRESETS)}")
+    if not named:
+        return PRESETS[preset]
+    base = PRESETS[preset]
+    says = {"name": f"{preset}, modified", "note": f"{base.note}; changed: {', '.join(named)}"}
+    return from_table(type(base), asdict(base) | says | named, "glider")
+
+
+def polar(model: Glider) -> Polar:
+    """The kernels' table of V [m/s] over |gamma|, with as many steps as POLAR_TOLERANCE needs."""
+    low, high = np.radians(model.angles)
+    steps, most = POLAR_STEPS
+    while True:
+        # twice as fine as the table: every other angle is a middle, where a chord errs most
+        angle = np.linspace(low, high, 2 * steps + 1)
+        speed = np.stack([model.speed(-angle), model.speed(angle)])
+        chord = 0.5 * (speed[:, :-2:2] + speed[:, 2::2])
+        if np.max(np.abs(chord / speed[:, 1::2] - 1.0)) < 0.9 * POLAR_TOLERANCE:
+            break
+        steps *= 2
+        if steps > most:
+            limits = np.degrees(np.abs(model.feasible_limits()))
+            raise InputError(
+                f"`glider.angles` = {list(model.angles)} begins too near the limit of a steady glide, "
+                f"{limits.max():.4f} degrees, for a table of {most} steps: begin steeper"
+            )
+    angle, speed = angle[::2], np.ascontiguousarray(speed[:, ::2])
+    fastest = np.array([_fastest(angle, row) for row in speed])
+    return Polar(np.full(2, low), np.full(2, high), speed, fastest[:, 0].copy(), fastest[:, 1].copy())
+
+
+def _fastest(angle: Array, speed: Array) -> tuple[float, float]:
+    """Angle [rad] and value [m/s] of the greatest V cos(angle), V linear between the rows of a table.
+
+    InputError unless V cos rises to it and falls after it, and V sin rises throughout: the kernels bisect.
+    """
+    slope = np.diff(speed) / np.diff(angle)
+    ends, values = np.stack([angle[:-1], angle[1:]]), np.stack([speed[:-1], speed[1:]])
+    # derivatives at both ends of every step
+    sinking = slope * np.sin(ends) + values * np.cos(ends)
+    rising = (slope * np.cos(ends) - values * np.sin(ends) > 0.0).T.ravel()
+    count = int(np.count_nonzero(rising))
+    where = f"within `glider.angles` = {np.degrees(angle[[0, -1]]).round(4).tolist()}"
+    require(bool(np.all(sinking > 0.0)), f"the vertical speed must rise with the glide angle {where}")
+    require(bool(np.all(rising[:count])), f"the horizontal speed must have one maximum {where}")
+    step = count // 2
+    best = float(angle[step])
+    if count % 2:  # inside the step, where the derivative is all but linear: Newton
+        for _ in range(5):
+            along = speed[step] + slope[step] * (best - angle[step])
+            sine, cosine = math.sin(best), math.cos(best)
+            best += float((slope[step] * cosine - along * sine) / (2.0 * slope[step] * sine + along * cosine))
+    # rounded up: no control may be faster than the lowest-speed test believes
+    return best, float(np.interp(best, angle, speed) * math.cos(best) * (1.0 + ROUNDING))
+
+
+def glider_sha256(polar: Polar) -> str:
+    """Digest of the polar's numbers, for the roadmap file: the same glider, the same digest."""
+    digest = hashlib.sha256()
+    for array in polar:
+        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,521 @@
+"""Currents on a grid into what the kernels read: an `OceanGrid` and the `Seabed` beneath it."""
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InputError
+from .frame import MAX_SCALE_ERROR, LocalFrame, Range, eastward, wrapped
+from .kernels.flow import OceanGrid, velocities
+from .kernels.terrain import Seabed, allowed
+from .settings import require
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Times = NDArray[np.datetime64]
+
+MARGIN = 2
+"""Cells kept around a domain: paths may stray."""
+HALO = 2
+"""Further cells that fill the dry ones of the margin: a value does not depend on where the domain ends."""
+MAP_ERROR = 1.0
+"""The index map misplaces no point of the grid by more than this [m] ..."""
+MAP_SIDE = 2049
+"""... unless it grows beyond this many points on a side; then a hundredth of a cell must do."""
+EVEN = 1e-3
+"""An axis this close to even, in cells, is even: the rest is the rounding of its degrees."""
+EDGE = 0.01
+"""A point is on the grid up to this far beyond its ends, in cells: degrees come rounded."""
+DEPTH_SLACK = 0.01
+"""As EDGE, for the deepest level [m]."""
+EARTH = 6_371_000.0
+
+
+@dataclass(frozen=True)
+class OceanFile:
+    """Currents as a file holds them, all conventions resolved.
+
+    `lon` (nx) rises eastward, `lat` (ny) northward [degrees]; `depth` (nz) rises downward [m]; `times` (nt)
+    UTC, or None if unknown. `u` east, `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data; `wet`
+    (nz, ny, nx) where there is data at every time. `surface`: the file names no depth, `depth` is [0].
+    `took` says what was taken for what; `notes` what else a user should know.
+    """
+
+    name: str
+    lon: Array
+    lat: Array
+    depth: Array
+    times: Times | None
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    wet: Bools
+    surface: bool
+    took: dict[str, str]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def steady(self) -> bool:
+        """Whether it holds a single time."""
+        return self.times is None or self.times.size == 1
+
+    @property
+    def time_range(self) -> str:
+        """First and last time, for people."""
+        if self.times is None:
+            return "no time"
+        return " to ".join(f"{t}Z" for t in np.unique(self.times[[0, -1]]).astype("datetime64[s]"))
+
+
+def parse_time(text: str, what: str) -> np.datetime64:
+    """An ISO 8601 text as UTC; without a zone it is UTC."""
+    try:
+        when = datetime.fromisoformat(text.strip())
+    except (ValueError, AttributeError):
+        raise InputError(f"{what} must be a time such as 2024-11-20T12:00:00; got {text!r}") from None
+    if when.tzinfo is not None:
+        when = when.astimezone(UTC).replace(tzinfo=None)
+    return np.datetime64(when, "ms")
+
+
+def columns(lon: Array, centre: float) -> tuple[NDArray[np.intp], Array]:
+    """Indices and longitudes of the unbroken run of columns about `centre`, west to east, modulo 360.
+
+    Longitudes are within 180 degrees of the centre; a file that circles the globe has no seam there.
+    """
+    turned = wrapped(lon, centre)
+    order = np.argsort(turned, kind="stable")
+    turned = turned[order]
+    breaks = np.flatnonzero(np.diff(turned) > 1.5 * np.diff(lon).max()) + 1
+    runs = np.split(np.arange(lon.size), breaks)
+    run = max(runs, key=lambda r: (bool(turned[r[0]] <= centre <= turned[r[-1]]), r.size))
+    return order[run], turned[run]
+
+
+def _span(axis: Array, bounds: Range, margin: int) -> slice:
+    first = int(np.searchsorted(axis, bounds[0], side="right")) - 1
+    last = int(np.searchsorted(axis, bounds[1], side="left"))
+    return slice(max(0, min(first, axis.size - 2) - margin), min(axis.size - 1, max(last, 1) + margin) + 1)
+
+
+def _degrees(axis: Array) -> str:
+    return f"{axis[0]:.6g} to {axis[-1]:.6g}"
+
+
+def crop(
+    name: str, axes: tuple[Array, Array, Array | None], lon: Range, lat: Range, depth: Range, centre: float
+) -> tuple[NDArray[np.intp], Array, slice, slice]:
+    """Columns, their longitudes, rows and levels of a domain with margin and halo; InputError if outside."""
+    which, lons = columns(axes[0], centre)
+    west, east = eastward(lon)
+    middle = float(wrapped((west + east) / 2, centre))
+    half = (east - west) / 2
+    lon = (middle - half, middle + half)
+    for what, axis, bounds in (("longitude", lons, lon), ("latitude", axes[1], lat)):
+        require(bounds[0] <= bounds[1], f"the domain's {what} must rise; got {bounds[0]:g} to {bounds[1]:g}")
+        slack = EDGE * np.diff(axis).max() if axis.size > 1 else 0.0
+        require(
+            axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack,
+            f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
+            f"which holds {_degrees(axis)}",
+        )
+    levels = slice(0, 1)
+    if axes[2] is not None:
+        require(
+            depth[1] <= axes[2][-1] + DEPTH_SLACK,
+            f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} "
+            f"is at {axes[2][-1]:g} m",
+        )
+        if axes[2].size > 1:
+            span = _span(axes[2], depth, 0)
+            levels = slice(span.start, span.stop + 1)
+    span = _span(lons, lon, MARGIN + HALO)
+    return which[span], lons[span], _span(axes[1], lat, MARGIN + HALO), levels
+
+
+def slots(points: Array) -> tuple[NDArray[np.uintp], float]:
+    """The table of even slots that leads to the cell of uneven points, and slots per unit."""
+    per_unit = 1 / float(np.diff(points).min())
+    count = int(np.ceil((points[-1] - points[0]) * per_unit)) + 1
+    starts = points[0] + np.arange(count) / per_unit
+    below = np.searchsorted(points, starts, side="right") - 1
+    return np.clip(below, 0, points.size - 2).astype(np.uintp), per_unit
+
+
+def filled(values: Array) -> Array:
+    """NaN of (levels, ni, nj, 2) replaced, levels downward: by wet neighbours, the level above, then 0.
+
+    Interpolation beside a coast reads these cells; a zero there would slow good water. The terrain keeps
+    gliders out of them.
+    """
+    values = values.copy()
+    for _ in range(HALO):
+        dry = np.isnan(values[..., 0])
+        if not dry.any():
+            return values
+        ni, nj = dry.shape[1:]
+        known = np.pad(~dry, ((0, 0), (1, 1), (1, 1))).astype(np.float64)
+        held = np.pad(np.where(dry[..., None], 0.0, values), ((0, 0), (1, 1), (1, 1), (0, 0)))
+        around = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+        count = sum(known[:, i : i + ni, j : j + nj] for i, j in around)
+        total = sum(held[:, i : i + ni, j : j + nj] for i, j in around)
+        reach = dry & (np.asarray(count) > 0)
+        values[reach] = np.asarray(total)[reach] / np.asarray(count)[reach][:, None]
+    for k in range(1, len(values)):
+        values[k] = np.where(np.isnan(values[k]), values[k - 1], values[k])
+    return np.nan_to_num(values)
+
+
+def lower_faces(depth: Array) -> Array:
+    """Depth [m] of each level's lower face: midway to the next; the last as far again as its upper one."""
+    if depth.size == 1:
+        return np.maximum(2 * depth, 1.0)
+    middle = (depth[1:] + depth[:-1]) / 2
+    return np.append(middle, 2 * depth[-1] - middle[-1])
+
+
+def bottoms(wet: Bools, faces: Array) -> Array:
+    """Height [m] of the bottom under each column of `wet` (nz, ...): 0 where the top level is dry."""
+    deep = np.cumprod(wet, axis=0).sum(axis=0)
+    return np.where(deep > 0, -faces[deep - 1], 0.0)
+
+
+def _fraction(axis: Array, at: Array) -> Array:
+    """Fractional index of values on a rising axis, straight on beyond its ends."""
+    even = np.linspace(axis[0], axis[-1], axis.size)
+    step = (axis[-1] - axis[0]) / (axis.size - 1)
+    if np.abs(axis - even).max() <= EVEN * step:
+        return np.asarray((at - axis[0]) / step)
+    below = np.clip(np.searchsorted(axis, at, side="right") - 1, 0, axis.size - 2)
+    return np.asarray(below + (at - axis[below]) / (axis[below + 1] - axis[below]))
+
+
+@dataclass(frozen=True)
+class IndexMap:
+    """The file's fractional indices at even points of the frame, as `OceanGrid` describes them.
+
+    `error` [m]: how far reading between the points misplaces a point of the grid, at worst.
+    """
+
+    index_map: Array
+    per_x: float
+    per_y: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    error: float
+
+
+def index_map(frame: LocalFrame, lon: Array, lat: Array) -> IndexMap:
+    """The map of a grid of longitudes and latitudes, as fine as MAP_ERROR asks."""
+    share = np.linspace(0, 1, 65)
+    west_east, south_north = lon[0] + share * (lon[-1] - lon[0]), lat[0] + share * (lat[-1] - lat[0])
+    rim_lon = np.concatenate([west_east, west_east, np.full(65, lon[0]), np.full(65, lon[-1])])
+    rim_lat = np.concatenate([np.full(65, lat[0]), np.full(65, lat[-1]), south_north, south_north])
+    x, y = frame.to_local(rim_lon, rim_lat)
+    # the rim bulges a little between the points above
+    pad_x, pad_y = 0.01 * np.ptp(x), 0.01 * np.ptp(y)
+    x_lo, x_hi, y_lo, y_hi = x.min() - pad_x, x.max() + pad_x, y.min() - pad_y, y.max() + pad_y
+    widest = np.cos(np.radians(np.abs(lat).min()))
+    cells = np.radians([np.diff(lon).max() * widest, np.diff(lat).max()]) * EARTH
+
+    def indices(side: int, shift_x: float, shift_y: float) -> Array:
+        px = x_lo + (np.arange(side) + shift_x) * (x_hi - x_lo) / (side - 1)
+        py = y_lo + (np.arange(side) + shift_y) * (y_hi - y_lo) / (side - 1)
+        at_lon, at_lat = frame.to_lonlat(*np.meshgrid(px, py, indexing="ij"))
+        return np.stack([_fraction(lon, at_lon), _fraction(lat, at_lat)], axis=-1)
+
+    side = 9
+    while True:
+        known, error = indices(side, 0, 0), 0.0
+        along = (known[1:, :] + known[:-1, :]) / 2
+        across = (known[:, 1:] + known[:, :-1]) / 2
+        for read, shift in (
+            (along, (0.5, 0.0)),
+            (across, (0.0, 0.5)),
+            ((along[:, 1:] + along[:, :-1]) / 2, (0.5, 0.5)),
+        ):
+            exact = indices(side, *shift)[: read.shape[0], : read.shape[1]]
+            inside = ((exact >= 0) & (exact <= [lon.size - 1, lat.size - 1])).all(axis=-1)
+            error = max(
+                error, float(np.hypot(*np.moveaxis((read - exact) * cells, -1, 0))[inside].max(initial=0))
+            )
+        if error <= MAP_ERROR or side >= MAP_SIDE:
+            break
+        side = 2 * side - 1
+    require(
+        error <= max(MAP_ERROR, 0.01 * cells.min()),
+        f"this grid is too uneven for a flat frame: points would be read {error:.1f} m off",
+    )
+    return IndexMap(
+        np.ascontiguousarray(known),
+        (side - 1) / (x_hi - x_lo),
+        (side - 1) / (y_hi - y_lo),
+        float(x_lo),
+        float(x_hi),
+        float(y_lo),
+        float(y_hi),
+        error,
+    )
+
+
+def _assemble(
+    values: Array,
+    levels: Array,
+    times: Array | None,
+    at: IndexMap,
+    bottom: Array,
+    spacing: float,
+    clearance: float,
+) -> tuple[OceanGrid, Seabed]:
+    """Values (times, levels, ni, nj, 2) without NaN, levels rising; a single level or time is doubled."""
+    span = (-np.inf, np.inf) if times is None else (float(times[0]), float(times[-1]))
+    if times is None:
+        times, values = np.array([0.0, 1.0]), np.repeat(values, 2, axis=0)
+    if levels.size == 1:
+        levels, values = levels[0] + np.array([-1.0, 0.0]), np.repeat(values, 2, axis=1)
+    level_slot, slots_per_z = slots(levels)
+    time_slot, slots_per_t = slots(times)
+    flow = OceanGrid(
+        values=np.ascontiguousarray(values),
+        levels=levels,
+        level_slot=level_slot,
+        slots_per_z=slots_per_z,
+        times=times,
+        time_slot=time_slot,
+        slots_per_t=slots_per_t,
+        index_map=at.index_map,
+        per_x=at.per_x,
+        per_y=at.per_y,
+        x_lo=at.x_lo,
+        x_hi=at.x_hi,
+        y_lo=at.y_lo,
+        y_hi=at.y_hi,
+        t_lo=span[0],
+        t_hi=span[1],
+        # every read value is a weighted mean of nodes
+        max_speed=float(np.sqrt((values**2).sum(axis=-1).max())) * (1 + 1e-12),
+        length_scale=spacing,
+    )
+    seabed = Seabed(
+        np.ascontiguousarray(bottom), clearance, at.index_map, at.per_x, at.per_y, at.x_lo, at.y_lo
+    )
+    return flow, seabed
+
+
+def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice, Array | None]:
+    """Which times a plan that starts at the epoch can read, and when they are [s]."""
+    if isinstance(epoch, str):
+        epoch = parse_time(epoch, "`epoch`")
+    if file.times is None or file.steady:
+        return slice(0, 1), None
+    require(
+        epoch is not None,
+        f"`epoch` is missing: {file.name} changes with time, {file.time_range}; say when t = 0 is",
+    )
+    assert epoch is not None
+    require(
+        bool(file.times[0] <= epoch <= file.times[-1]),
+        f"`epoch` = {epoch.astype('datetime64[s]')}Z lies outside the times of {file.name}, "
+        f"{file.time_range}",
+    )
+    seconds = (file.times - epoch) / np.timedelta64(1, "s")
+    first = min(int(np.searchsorted(seconds, 0, side="right")) - 1, seconds.size - 2)
+    return slice(first, seconds.size), seconds[first:]
+
+
+def _build(
+    file: OceanFile,
+    frame: LocalFrame,
+    lon: Range,
+    lat: Range,
+    depth: Range,
+    epoch: str | np.datetime64 | None,
+    clearance: float,
+) -> tuple[OceanGrid, Seabed]:
+    during, seconds = _seconds(file, epoch)
+    axes = (file.lon, file.lat, None if file.surface else file.depth)
+    which, lons, rows, levels = crop(file.name, axes, lon, lat, depth, frame.lon)
+    lats, depths = file.lat[rows], file.depth[levels]
+    turn = frame.convergence(*np.meshgrid(lons, lats, indexing="ij"))
+    cos, sin = np.cos(turn), np.sin(turn)
+
+    # the halo has done its work once the dry cells are filled; at the file's edge there is none to drop
+    west, east = eastward(lon)
+    middle = float(wrapped((west + east) / 2, frame.lon))
+    kept_i = _span(lons, (middle - (east - west) / 2, middle + (east - west) / 2), MARGIN)
+    kept_j = _span(lats, lat, MARGIN)
+    count = file.u[during].shape[0]
+    values = np.empty((count, depths.size, kept_i.stop - kept_i.start, kept_j.stop - kept_j.start, 2))
+    wet = np.ones((file.depth.size, lons.size, lats.size), dtype=bool)
+    for n in range(count):
+        here = np.s_[during.start + n, :, rows, :]
+        east_north = [
+            part[here][..., which].transpose(0, 2, 1).astype(np.float64) for part in (file.u, file.v)
+        ]
+        wet &= np.isfinite(east_north[0])
+        u, v = (part[levels] for part in east_north)
+        turned = np.stack([u * cos - v * sin, u * sin + v * cos], axis=-1)
+        values[n] = filled(turned)[::-1, kept_i, kept_j]
+    wet = wet[:, kept_i, kept_j]
+    lons, lats = lons[kept_i], lats[kept_j]
+    faces = np.array([np.inf]) if file.surface else lower_faces(file.depth)
+    at_centre = np.radians([np.diff(lons).min() * np.cos(np.radians(sum(lat) / 2)), np.diff(lats).min()])
+    return _assemble(
+        values,
+        -depths[::-1],
+        seconds,
+        index_map(frame, lons, lats),
+        bottoms(wet, faces),
+        float(at_centre.min()) * EARTH,
+        clearance,
+    )
+
+
+def ocean_flow(
+    file: OceanFile,
+    frame: LocalFrame,
+    lon: Range,
+    lat: Range,
+    depth: Range,
+    epoch: str | None = None,
+    clearance: float = 0.0,
+) -> tuple[OceanGrid, Seabed]:
+    """The flow and seabed of a domain: `lon`, `lat` [degrees], `depth` [m], with a margin of two cells.
+
+    t = 0 at `epoch` (ISO 8601, UTC), which a file with several times needs. A glider keeps `clearance` [m]
+    above the bottom: the lower face of the deepest wet cell of the nearest column. Above the top level, and
+    at all depths where the file names none, the current is held.
+    """
+    require(clearance >= 0, f"`clearance` must be at least 0 m; got {clearance:g}")
+    require(0 <= depth[0] <= depth[1], f"the domain's depth must rise from 0 or below; got {list(depth)}")
+    flow, seabed = _build(file, frame, lon, lat, depth, epoch, clearance)
+    error = frame.scale_error(lon, lat)
+    require(
+        error <= MAX_SCALE_ERROR,
+        f"the domain is too wide for a flat frame, whose metres would be {100 * error:.1f} % off; narrow it",
+    )
+    require(
+        bool((seabed.bottom < 0).any()), f"the domain holds no water in {file.name}: every column is land"
+    )
+    return flow, seabed
+
+
+def sample(
+    file: OceanFile, lon: float, lat: float, depth: float | None = None, time: str | None = None
+) -> tuple[float, float] | None:
+    """Current (u_east, v_north) [m/s] as the planner reads it; None where there is no water or no data.
+
+    No `depth` [m] is the surface; `time` (ISO 8601, UTC) is needed where the file holds several.
+    """
+    depth = 0.0 if depth is None else float(depth)
+    require(bool(np.isfinite([lon, lat, depth]).all()), f"a point must be numbers; got {lon}, {lat}, {depth}")
+    require(abs(lat) <= 90, f"a latitude must be within [-90, 90] degrees; got {lat:g}")
+    require(depth >= 0, f"a depth counts downward from the surface, 0 or more; got {depth:g}")
+    when = None if time is None else parse_time(time, "a point's time")
+    if not file.steady:
+        assert file.times is not None
+        require(
+            when is not None, f"{file.name} holds several times, {file.time_range}: give each point its time"
+        )
+        assert when is not None
+        if not file.times[0] <= when <= file.times[-1]:
+            return None
+        first = int(np.searchsorted(file.times, when, side="right")) - 1
+        during = slice(first, first + (1 if file.times[first] == when else 2))
+        # a gap at another time is no reason to have no answer at this one
+        file = replace(file, times=file.times[during], u=file.u[during], v=file.v[during])
+    _, lons = columns(file.lon, lon)
+    slack_lon, slack_lat = EDGE * np.diff(lons).max(initial=0), EDGE * np.diff(file.lat).max(initial=0)
+    at_lon, at_lat = float(np.clip(lon, lons[0], lons[-1])), float(np.clip(lat, file.lat[0], file.lat[-1]))
+    if abs(at_lon - lon) > slack_lon or abs(at_lat - lat) > slack_lat:
+        return None
+    if not file.surface:
+        if depth > file.depth[-1] + DEPTH_SLACK:
+            return None
+        depth = min(depth, float(file.depth[-1]))
+    frame = LocalFrame(at_lon, at_lat)
+    flow, seabed = _build(file, frame, (at_lon, at_lon), (at_lat, at_lat), (depth, depth), when, 0.0)
+    x, y = (float(part) for part in frame.to_local(at_lon, at_lat))
+    if not allowed(seabed, x, y, -depth):
+        return None
+    zero = np.zeros(1)
+    u, v = velocities(flow, zero + x, zero + y, zero - depth, zero)[0]
+    turn = float(frame.convergence(at_lon, at_lat))
+    return float(u * np.cos(turn) + v * np.sin(turn)), float(v * np.cos(turn) - u * np.sin(turn))
+
+
+def _rising(axis: Any, what: str, even: bool) -> tuple[Array, int]:
+    """The axis, rising, and -1 if it had to be turned."""
+    axis = np.atleast_1d(np.asarray(axis, dtype=np.float64))
+    require(axis.ndim == 1 and bool(np.isfinite(axis).all()), f"`{what}` must be a line of numbers")
+    turn = -1 if axis.size > 1 and axis[0] > axis[-1] else 1
+    steps = np.diff(axis[::turn])
+    require(
+        bool((steps > 0).all()), f"`{what}` must rise or fall steadily; got {axis.size} values that do not"
+    )
+    if even:
+        require(axis.size > 1, f"`{what}` must hold at least two values; got {axis.size}")
+        require(float(np.ptp(steps)) <= EVEN * float(steps.mean()), f"`{what}` must be evenly spaced")
+    return axis[::turn], turn
+
+
+def grid_flow(
+    x: ArrayLike,
+    y: ArrayLike,
+    z: ArrayLike,
+    u: ArrayLike,
+    v: ArrayLike,
+    t: ArrayLike | None = None,
+    mask: ArrayLike | None = None,
+    clearance: float = 0.0,
+) -> tuple[OceanGrid, Seabed]:
+    """Flow and seabed from arrays on an even metric grid: x (nx), y (ny), z (nz) [m, upward], t (nt) [s].
+
+    u, v [m/s] of shape (nt, nz, ny, nx), or (nz, ny, nx) if steady. NaN is no water, and so is True in `mask`
+    (ny, nx) or (nz, ny, nx). A single level is held at all depths, and then water has no bottom.
+    """
+    (x, turn_x), (y, turn_y), (z, turn_z) = (
+        _rising(x, "x", True),
+        _rising(y, "y", True),
+        _rising(z, "z", False),
+    )
+    times = None if t is None else _rising(t, "t", False)[0]
+    shape = (1 if times is None else times.size, z.size, y.size, x.size)
+    parts = []
+    for name, part in (("u", u), ("v", v)):
+        part = np.asarray(part, dtype=np.float64)
+        part = part[None] if part.ndim == 3 else part
+        require(
+            part.shape == shape, f"`{name}` must have the shape (times, z, y, x) = {shape}; got {part.shape}"
+        )
+        parts.append(part)
+    values = np.stack(parts, axis=-1)
+    require(not np.isinf(values).any(), "`u` and `v` must be finite, or NaN where there is no water; got inf")
+    if mask is not None:
+        try:
+            dry = np.broadcast_to(np.asarray(mask, dtype=bool), shape[1:])
+        except ValueError:
+            raise InputError(f"`mask` must have the shape {shape[1:]}; got {np.shape(mask)}") from None
+        values = np.where(dry[None, ..., None], np.nan, values)
+    values = np.where(np.isnan(values).any(axis=-1, keepdims=True), np.nan, values)
+    # (times, z, y, x, 2) -> (times, levels downward, ni, nj, 2)
+    values = values[:, ::turn_z, ::turn_y, ::turn_x][:, ::-1].transpose(0, 1, 3, 2, 4)
+    if times is not None and np.asarray(t).ravel()[0] > times[0]:
+        values = values[::-1]
+    wet = np.isfinite(values[..., 0]).all(axis=0)
+    require(bool(wet[0].any()), "the grid holds no water: `u` and `v` are NaN or masked in every column")
+    faces = np.array([np.inf]) if z.size == 1 else lower_faces(-z[::-1])
+    corner = np.array(
+        [[[0, 0], [0, y.size - 1]], [[x.size - 1, 0], [x.size - 1, y.size - 1]]], dtype=np.float64
+    )
+    width, height = float(x[-1] - x[0]), float(y[-1] - y[0])
+    box = (float(x[0]), float(x[-1]), float(y[0]), float(y[-1]))
+    at = IndexMap(corner, 1 / width, 1 / height, *box, error=0.0)
+    full = np.stack([filled(step)[::-1] for step in values])
+    spacing = min(width / (x.size - 1), height / (y.size - 1))
+    one = None if times is None or times.size == 1 else times
+    return _assemble(full, z, one, at, bottoms(wet, faces), spacing, clearance)

@@ -1,0 +1,85 @@
+"""The planner: one call for each command."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path as File
+from typing import TYPE_CHECKING
+
+from .domain import Point
+from .export import check_export, export_path
+from .query import Path, Planner, load_path
+from .roadmap import Progress, Roadmap, build_roadmap
+from .scenario import Scenario, read_scenario, scenario_from_text
+from .store import check_output, read_roadmap, write_roadmap
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def build(
+    scenario: str | File | Scenario,
+    output: str | File | None = None,
+    *,
+    threads: int | None = None,
+    overrides: Sequence[str] = (),
+    progress: Callable[[Progress], None] = lambda progress: None,
+) -> Roadmap:
+    """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says."""
+    if output is not None:
+        check_output(output)
+    resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
+    roadmap = build_roadmap(resolved.problem(), threads, progress)
+    if output is not None:
+        write_roadmap(roadmap, output)
+    return roadmap
+
+
+def info(roadmap: str | File | Roadmap) -> Roadmap:
+    """A roadmap from its file; printed, it says what it is."""
+    return roadmap if isinstance(roadmap, Roadmap) else read_roadmap(roadmap)
+
+
+def query(
+    roadmap: str | File | Roadmap,
+    start: Point | None = None,
+    goal: Point | None = None,
+    outputs: Sequence[str | File] = (),
+) -> Path:
+    """The cheapest path between two points, given in the coordinates of the scenario's domain.
+
+    These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
+    scenario's own start and goal where none are given. Written to each of `outputs`.
+    """
+    for output in outputs:
+        check_export(output)
+    road = info(roadmap)
+    scenario = scenario_from_text(road.provenance.scenario)
+    ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
+    path = Planner(road, scenario.problem()).query(*ends)
+    for output in outputs:
+        export_path(path, output)
+    return path
+
+
+def plot(
+    roadmap: str | File | Roadmap,
+    path: str | File | Path | None = None,
+    output: str | File | None = None,
+    depths: Sequence[float] | None = None,
+) -> "Figure":
+    """Draw a path over its roadmap and the current, or the roadmap where there is none."""
+    from .plot import check_figure, plot_roadmap, plot_route, save_figure
+
+    if output is not None:
+        check_figure(output)
+    road = info(roadmap)
+    scenario = scenario_from_text(road.provenance.scenario)
+    problem = scenario.problem()
+    flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
+    if path is None:
+        figure = plot_roadmap(flow, terrain, problem, road)
+    else:
+        route = path if isinstance(path, Path) else load_path(path)
+        figure = plot_route(flow, terrain, problem, road.position, route, depths)
+    if output is not None:
+        save_figure(figure, output)
+    return figure

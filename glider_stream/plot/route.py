@@ -1,0 +1,158 @@
+"""A route three ways, as the paper's figure 4: in space, over the current, as depth against time."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..flow import is_steady
+from ..kernels.flow import Flow
+from ..kernels.terrain import Terrain
+from ..settings import require
+from .canvas import GREY, INK, Array, colours, frozen, new_figure, said_time, styled, time_unit
+from .water import Frame, draw_current, draw_ends, draw_space, frame_of, sample_field, stretch
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..query import Path
+    from ..roadmap import Problem
+
+MAX_MAPS, MAX_NUMBERS, ARROWS = 4, 40, 44
+SURFACED = 0.02  # of the deepest depth: a leg that ends above it ends at the surface
+
+
+def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) -> Array:
+    """The depths [m] of the maps: those asked for, else the nodes' own if few, else evenly spread ones."""
+    if depths is not None:
+        require(1 <= len(depths) <= MAX_MAPS, f"`depths` must name 1 to {MAX_MAPS} depths; got {len(depths)}")
+        require(min(depths) >= 0, f"`depths` [m] are downward, 0 or more; got {min(depths):g}")
+        return np.unique(np.asarray(depths, np.float64))
+    own = np.unique(np.round(-position[:, 2], 1) + 0.0)
+    return own if own.size <= MAX_MAPS else np.round(np.linspace(frame.top, frame.bottom, MAX_MAPS))
+
+
+def plot_route(
+    flow: Flow,
+    terrain: Terrain,
+    problem: "Problem",
+    position: Array,
+    path: "Path",
+    depths: Sequence[float] | None = None,
+    title: str = "",
+) -> "Figure":
+    """Draw a path among the nodes `position` (n, 3) [m], over the current at up to four `depths` [m].
+
+    Of `problem`, the box `lo`, `hi` [m] and the `departure` [s] are read: the time of the maps.
+    """
+    require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
+    with styled():
+        from matplotlib.colors import Normalize
+
+        rows = np.asarray(path.trajectory, np.float64)
+        stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)], np.float64)
+        frame = frame_of(problem, np.vstack([rows[:, 1:], stops]))
+        norm = Normalize(frame.top, frame.bottom)
+        said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        figure = new_figure(13.0, 9.8, f"{title}: {said}" if title else f"Route: {said}")
+        grid = figure.add_gridspec(2, 2, height_ratios=(2.4, 1.0), width_ratios=(1.0, 1.15))
+        space = figure.add_subplot(grid[0, 0], projection="3d")
+        draw_space(space, terrain, frame, position, label="node")
+        _draw_flight(space, frame, rows, stops, norm)
+        levels = map_depths(position, frame, depths)
+        columns = 1 if levels.size == 1 else 2
+        cells = grid[0, 1].subgridspec(-(-levels.size // columns), columns)
+        maps = [figure.add_subplot(cells[n // columns, n % columns]) for n in range(levels.size)]
+        for n, (ax, depth) in enumerate(zip(maps, levels, strict=True)):
+            draw_current(ax, flow, terrain, frame, depth, problem.departure)
+            when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+            ax.set_title(f"{'(b) ' if n == 0 else ''}Current at {depth:.4g} m{when}")
+            below, left = n + columns >= levels.size, n % columns == 0
+            ax.set(xlabel=f"East ({frame.name})" * below, ylabel=f"North ({frame.name})" * left)
+            ax.tick_params(labelbottom=below, labelleft=left)
+            _draw_track(ax, frame, rows, stops, depth, norm)
+        _share_colours(figure, maps)
+        _draw_profile(figure.add_subplot(grid[1, :]), flow, path, rows, problem.departure, norm)
+        return frozen(figure)
+
+
+def _route(line: Array, depth: Array, norm: Any, width: float) -> Any:
+    """A line (n, 2) or (n, 3), coloured by depth."""
+    from matplotlib.collections import LineCollection
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-untyped]
+
+    kind = Line3DCollection if line.shape[1] == 3 else LineCollection
+    route = kind(list(np.stack([line[:-1], line[1:]], axis=1)), cmap=colours("plasma_r", 0.22), norm=norm)
+    route.set(array=0.5 * (depth[:-1] + depth[1:]), linewidth=width, capstyle="round", zorder=5)
+    return route
+
+
+def _draw_flight(ax: Any, frame: Frame, rows: Array, stops: Array, norm: Any) -> None:
+    line, ends = frame.scaled(rows[:, 1:]), frame.scaled(stops)
+    ax.plot(*line[:, :2].T, frame.bottom, color="#b0b0b0", linewidth=1.2, zorder=3, label="track below")
+    ax.plot(*line.T, color="white", linewidth=4.2, zorder=4)
+    ax.add_collection(_route(line, line[:, 2], norm, 2.6))
+    between = ends[1:-1]
+    up = between[:, 2] <= SURFACED * frame.bottom
+    for mask, marker, label in ((~up, "o", "end of a leg"), (up, "^", "surfacing")):
+        if mask.any():
+            look = {"edgecolors": INK, "facecolors": "white", "linewidths": 0.9, "depthshade": False}
+            ax.scatter(*between[mask].T, marker=marker, s=26, label=label, zorder=6, **look)
+    draw_ends(ax, ends)
+    ax.set_title(f"(a) The route in space, {stretch(frame)}", loc="left")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3, frameon=False, fontsize=8)
+
+
+def _draw_track(ax: "Axes", frame: Frame, rows: Array, stops: Array, depth: float, norm: Any) -> None:
+    line = frame.scaled(rows[:, 1:])
+    ax.plot(*line[:, :2].T, color="white", linewidth=2.9, solid_capstyle="round", zorder=4)
+    ax.add_collection(_route(line[:, :2], line[:, 2], norm, 1.3))
+    # a sixth: with four maps evenly spread, each part of the route is bold in just one
+    far = np.abs(line[:, 2] - depth) > (frame.bottom - frame.top) / 6.0
+    near = np.where(far[:, None], np.nan, line[:, :2])
+    ax.plot(*near.T, color="white", linewidth=5.4, solid_capstyle="round", zorder=6)
+    ax.plot(*near.T, color=INK, linewidth=3.2, solid_capstyle="round", zorder=7)
+    draw_ends(ax, frame.scaled(stops)[:, :2], 0.7)
+
+
+def _share_colours(figure: "Figure", maps: list[Any]) -> None:
+    images = [ax.images[-1] for ax in maps]
+    fastest = max(float(np.ma.filled(image.get_array(), 0.0).max()) for image in images)
+    for image in images:
+        image.set_clim(0.0, fastest or 1.0)
+    figure.colorbar(images[0], ax=maps, label="Current speed (m/s)", aspect=35, pad=0.02)
+
+
+def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: float, norm: Any) -> None:
+    unit, name = time_unit(float(rows[-1, 0] - rows[0, 0]))
+    time, depth = rows[:, 0] / unit, -rows[:, 3] + 0.0
+    span = max(float(np.ptp(depth)), 1.0)
+    ax.set(xlim=(time[0], time[-1]), ylim=(depth.max() + 0.2 * span, depth.min() - 0.32 * span))
+    ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
+    ax.plot(time, depth, color="white", linewidth=4.0, zorder=4)
+    line = ax.add_collection(_route(np.column_stack([time, depth]), depth, norm, 2.4))
+    look: dict[str, Any]
+    step, last = -(-len(path.legs) // MAX_NUMBERS), -np.inf
+    for n, leg in enumerate(path.legs):
+        start, middle = leg.depart / unit, (leg.depart + 0.5 * leg.duration) / unit
+        if n % 2 == 0:
+            ax.axvspan(start, start + leg.duration / unit, color="#f0f0f0", linewidth=0, zorder=0)
+        if n % step == 0 and middle - last > 0.02 * (time[-1] - time[0]):
+            look = {"ha": "center", "va": "top", "color": "#555555", "fontsize": 8}
+            ax.text(middle, 0.965, str(n + 1), transform=ax.get_xaxis_transform(), **look)
+            last = middle
+    at = np.linspace(rows[0, 0], rows[-1, 0], ARROWS)[1:-1]
+    x, y, z = (np.interp(at, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
+    u, v = sample_field(flow, x, y, z, at + departure)
+    fastest = float(np.nanmax(np.hypot(u, v), initial=0.0)) or 1.0
+    power = 10.0 ** np.floor(np.log10(fastest))
+    key = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= fastest)
+    look = {"angles": "uv", "scale_units": "inches", "scale": fastest / 0.5, "width": 0.0016, "zorder": 8}
+    arrows = ax.quiver(at / unit, -z, u, v, color=INK, headwidth=4.5, **look)
+    ax.quiverkey(arrows, 0.95, 1.065, key, f"{key:g} m/s", labelpos="W", coordinates="axes")
+    ax.set_yticks([tick for tick in ax.get_yticks() if 0.0 <= tick <= depth.max() + 0.2 * span])
+    ax.set(xlabel=f"Time since departure ({name})", ylabel="Depth (m)")
+    ax.set_title("(c) Depth against time, legs numbered; arrows: the horizontal current on the way, north up")
+    bar = ax.figure.colorbar(line, ax=ax, label="Depth of the route (m)", aspect=12, pad=0.01)
+    bar.ax.invert_yaxis()

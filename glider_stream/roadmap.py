@@ -1,0 +1,243 @@
+"""The roadmap: nodes, the legs between them, and how it is built."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import Evaluator, Status, count_statuses, threads
+from .flow import flow_sha256
+from .glider import glider_sha256
+from .kernels.cache import KERNEL_DIGEST
+from .neighbours import Neighbourhood, NeighbourLaw, as_csr
+from .sampling import Sampler
+from .settings import require
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+BATCH_PAIRS = 100_000
+EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scenario made into objects: what `build` and `query` need.
+
+    `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
+    x, y [m] into degrees where the scenario is geographic. `summary` says what it is, in words.
+    """
+
+    evaluator: Evaluator
+    sampler: Sampler
+    law: NeighbourLaw
+    lo: Array
+    hi: Array
+    departure: float
+    start: Array | None
+    goal: Array | None
+    scenario: str
+    flow_words: str
+    glider_words: str
+    to_lonlat: Callable[[Array], Array] | None = None
+
+    def check_point(self, point: Array, name: str) -> None:
+        """InputError unless a glider can be at `point` (3,) [m]."""
+        said = "[" + ", ".join(f"{value:g}" for value in point) + "]"
+        require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
+        require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
+        inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
+        require(inside, f"`{name}` = {said} lies outside the flow or on land; move it into open water")
+
+    def neighbourhood(self, position: Array) -> Neighbourhood:
+        """The neighbour law, ready for these nodes."""
+        return self.law.among(position, float(np.prod(self.hi - self.lo)))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a build is: pairs done and in all, connected so far, seconds since it began."""
+
+    done: int
+    total: int
+    connected: int
+    seconds: float
+
+    def __str__(self) -> str:
+        rate = self.done / max(self.seconds, 1e-9)
+        left = (self.total - self.done) / rate if self.done else math.inf
+        share = self.connected / max(self.done, 1)
+        return (
+            f"{self.done:,} of {self.total:,} pairs, {rate:,.0f} pairs/s, {share:.1%} connected, {left:,.0f} s left"
+        )
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What made a roadmap."""
+
+    scenario: str
+    flow: str
+    glider: str
+    flow_sha256: str
+    glider_sha256: str
+    kernel_digest: str
+    seed: int
+    created: str
+    software_version: str
+
+
+@dataclass(frozen=True)
+class Roadmap:
+    """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
+
+    `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
+    (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status.
+    """
+
+    position: Array
+    indptr: Index
+    target: NDArray[np.int32]
+    time: Array
+    cost: Array
+    glide_angle: Array
+    heading: Array
+    speed: Array
+    miss: Array
+    counts: dict[str, int]
+    provenance: Provenance
+    wall_s: float
+    threads: int
+    lonlat: Array | None = field(default=None)
+
+    @property
+    def evaluated(self) -> int:
+        """How many pairs were looked at."""
+        return sum(self.counts.values())
+
+    @property
+    def connected_share(self) -> float:
+        """Edges found, as a share of the pairs looked at."""
+        return self.target.size / max(self.evaluated, 1)
+
+    @property
+    def pairs_per_s(self) -> float:
+        """Pairs evaluated per second of wall time, compilation left out."""
+        return self.evaluated / max(self.wall_s, 1e-9)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `info --json` says."""
+        return {
+            "nodes": len(self.position),
+            "edges": self.target.size,
+            "evaluated": self.evaluated,
+            "connected_share": self.connected_share,
+            "counts": self.counts,
+            "pairs_per_s": self.pairs_per_s,
+            "wall_s": self.wall_s,
+            "threads": self.threads,
+            **asdict(self.provenance),
+        }
+
+    def __str__(self) -> str:
+        others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
+        return (
+            f"Roadmap: {len(self.position):,} nodes, {self.target.size:,} edges\n"
+            f"  pairs:  {self.evaluated:,} evaluated, {self.connected_share:.1%} connected ({others})\n"
+            f"  flow:   {self.provenance.flow}\n"
+            f"  glider: {self.provenance.glider}\n"
+            f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
+            f"{self.provenance.created}"
+        )
+
+
+def node_positions(problem: Problem) -> Array:
+    """The scenario's nodes (n, 3) [m]; its start and goal are the last two, where it names them."""
+    sampled = problem.sampler.nodes(
+        problem.lo, problem.hi, lambda points: problem.evaluator.allowed(points, problem.departure)
+    )
+    named = []
+    for name, point in (("query.start", problem.start), ("query.goal", problem.goal)):
+        if point is not None:
+            problem.check_point(point, name)
+            named.append(point)
+    position = np.vstack([sampled, *named])
+    require(len(position) > 0, "the scenario has no node in open water; move the domain or sample more")
+    return position
+
+
+def warm_up(evaluator: Evaluator) -> None:
+    """Compile the kernels that `evaluator` needs, or load them from the disk cache."""
+    evaluator.connect(np.zeros((2, 3)), 0.0, [0], [0, 1], [1])
+
+
+def build_roadmap(
+    problem: Problem,
+    thread_count: int | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+    batch_pairs: int = BATCH_PAIRS,
+) -> Roadmap:
+    """Evaluate all neighbour pairs of a problem, in batches of whole nodes of some `batch_pairs` pairs.
+
+    Neither the number of threads nor the batch size changes a bit of the result.
+    """
+    require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
+    position = node_positions(problem)
+    neighbourhood = problem.neighbourhood(position)
+    nodes = len(position)
+    degree = np.zeros(nodes, np.int64)
+    found: list[tuple[Index, Array]] = []
+    counts = dict.fromkeys((status.name.lower() for status in Status), 0)
+    with threads(thread_count) as used:
+        warm_up(problem.evaluator)
+        began = time.perf_counter()
+        first, looked = 0, 0
+        while first < nodes:
+            rows, pairs = [], 0
+            while first + len(rows) < nodes and pairs < batch_pairs:
+                rows.append(neighbourhood.of(position[first + len(rows)]))
+                pairs += len(rows[-1])
+            indptr, target = as_csr(rows)
+            source = np.arange(first, first + len(rows))
+            outcomes = problem.evaluator.connect(position, problem.departure, source, indptr, target)
+            connected = outcomes[:, 0] == Status.CONNECTED
+            np.add.at(degree, np.repeat(source, np.diff(indptr))[connected], 1)
+            found.append((target[connected], outcomes[connected, 1:]))
+            for name, count in count_statuses(outcomes).items():
+                counts[name] += count
+            first, looked = first + len(rows), looked + pairs
+            total = looked + round(looked / first * (nodes - first))
+            progress(Progress(looked, total, counts["connected"], time.perf_counter() - began))
+        wall = time.perf_counter() - began
+    edges = np.concatenate([rows for _, rows in found])
+    return Roadmap(
+        position=position,
+        indptr=np.concatenate([[0], np.cumsum(degree)]),
+        target=np.concatenate([target for target, _ in found]).astype(np.int32),
+        counts=counts,
+        provenance=provenance_of(problem),
+        wall_s=wall,
+        threads=used,
+        lonlat=None if problem.to_lonlat is None else problem.to_lonlat(position),
+        **{name: np.ascontiguousarray(edges[:, n]) for n, name in enumerate(EDGE_FIELDS)},
+    )
+
+
+def provenance_of(problem: Problem) -> Provenance:
+    """What a roadmap of this problem is made by, now."""
+    return Provenance(
+        scenario=problem.scenario,
+        flow=problem.flow_words,
+        glider=problem.glider_words,
+        flow_sha256=flow_sha256(problem.evaluator.flow),
+        glider_sha256=glider_sha256(problem.evaluator.polar),
+        kernel_digest=KERNEL_DIGEST,
+        seed=problem.sampler.seed,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        software_version=version("glider-stream"),
+    )

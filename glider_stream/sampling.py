@@ -1,0 +1,103 @@
+"""Node samplers: where a roadmap's nodes lie in a box."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from .settings import require
+
+Array = NDArray[np.float64]
+Allowed = Callable[[Array], NDArray[np.bool_]]
+"""Which of the points (n, 3) [m] a node may lie at."""
+
+
+class Sampler(Protocol):
+    """A law of nodes: `nodes` places them, `seed` is 0 where there is none."""
+
+    seed: int
+
+    def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
+        """Points (n, 3) [m] in the box lo..hi (3,) [m]."""
+        ...
+
+
+@dataclass(frozen=True)
+class GridSampler:
+    """A regular grid: cell-centred in x and y, levels from end to end in z; points on land are left out."""
+
+    shape: tuple[int, int, int]
+    seed = 0
+
+    def __post_init__(self) -> None:
+        require(min(self.shape) >= 1, f"`sampling.shape` must be at least 1 each way; got {list(self.shape)}")
+
+    def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
+        """As Sampler says; x outermost, z innermost, from the surface down."""
+        nx, ny, nz = self.shape
+        x = lo[0] + (np.arange(nx) + 0.5) / nx * (hi[0] - lo[0])
+        y = lo[1] + (np.arange(ny) + 0.5) / ny * (hi[1] - lo[1])
+        z = np.linspace(hi[2], lo[2], nz)
+        points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+        return np.asarray(points[allowed(points)])
+
+
+@dataclass(frozen=True)
+class RandomSampler:
+    """`count` points drawn from a seeded sequence; points on land are drawn again."""
+
+    count: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        require(self.count >= 1, f"`sampling.count` must be at least 1; got {self.count}")
+        require(self.seed >= 0, f"`sampling.seed` must be at least 0; got {self.seed}")
+
+    def draw(self, count: int) -> Array:
+        """The first `count` points (count, 3) of the sequence in the unit cube."""
+        return np.random.default_rng(self.seed).random((count, 3))
+
+    def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
+        """As Sampler says."""
+        drawn = self.count
+        while True:
+            points = lo + self.draw(drawn) * (hi - lo)
+            points = points[allowed(points)]
+            if len(points) >= self.count:
+                return points[: self.count]
+            drawn *= 2
+            require(
+                drawn <= 256 * self.count,
+                f"only {len(points)} of {drawn // 2} points drawn lie in open water, `sampling.count` = "
+                f"{self.count} needs more; move the domain off the land",
+            )
+
+
+@dataclass(frozen=True)
+class SobolSampler(RandomSampler):
+    """A scrambled Sobol sequence."""
+
+    def draw(self, count: int) -> Array:
+        """As RandomSampler says."""
+        powers = (count - 1).bit_length()
+        return np.asarray(qmc.Sobol(3, rng=np.random.default_rng(self.seed)).random_base2(powers)[:count])
+
+
+@dataclass(frozen=True)
+class HaltonSampler(RandomSampler):
+    """A scrambled Halton sequence."""
+
+    def draw(self, count: int) -> Array:
+        """As RandomSampler says."""
+        return np.asarray(qmc.Halton(3, rng=np.random.default_rng(self.seed)).random(count))
+
+
+SAMPLERS: dict[str, type[Sampler]] = {
+    "grid": GridSampler,
+    "uniform": RandomSampler,
+    "sobol": SobolSampler,
+    "halton": HaltonSampler,
+}
