@@ -10,33 +10,33 @@ import click
 from .errors import InputError
 
 
-class Place(click.ParamType):
-    """Numbers with commas between; `optional_text` lets a last part be a text."""
+def place(text: str, texts: int = 0) -> tuple[Any, ...]:
+    """Three numbers with commas between, then up to `texts` texts."""
+    parts = text.split(",")
+    try:
+        numbers = tuple(float(part) for part in parts[:3])
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3 or len(parts) > 3 + texts:
+        raise click.BadParameter(f"{text!r} is not three numbers with commas between, such as 100,-50,-20")
+    return (*numbers, *parts[3:])
 
-    def __init__(self, name: str, texts: int = 0) -> None:
-        self.name, self.texts = name, texts
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """As click asks."""
-        parts = str(value).split(",")
-        try:
-            numbers = tuple(float(part) for part in parts[:3])
-        except ValueError:
-            numbers = ()
-        if len(numbers) != 3 or len(parts) > 3 + self.texts:
-            self.fail(f"{value!r} is not {self.name}: numbers with commas between, no blanks")
-        return (*numbers, *parts[3:])
+def place_and_time(text: str) -> tuple[Any, ...]:
+    """Three numbers, then a time if one is given."""
+    return place(text, texts=1)
 
 
 def _write_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=1))
 
 
+FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
-ROADMAP = click.argument("roadmap", type=click.Path(path_type=Path))
+ROADMAP = click.argument("roadmap", type=FILE)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
 @click.version_option(package_name="glider-stream")
 def cli() -> None:
     """Plan underwater glider routes in ocean currents."""
@@ -44,9 +44,9 @@ def cli() -> None:
 
 @cli.command()
 @click.argument("scenario")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="The roadmap file to write.")
+@click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
-@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a scenario key.")
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
 def build(scenario: str, output: Path, threads: int | None, overrides: tuple[str, ...]) -> None:
     """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one."""
     from . import planner
@@ -59,9 +59,9 @@ def build(scenario: str, output: Path, threads: int | None, overrides: tuple[str
 
 @cli.command()
 @ROADMAP
-@click.option("--start", type=Place("X,Y,Z"), help="Metres, z upward; LON,LAT,DEPTH in a geographic scenario.")
-@click.option("--goal", type=Place("X,Y,Z"), help="As --start.")
-@click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), help="A route file.")
+@click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
+@click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
+@click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
 def query(roadmap: Path, start: Any, goal: Any, outputs: tuple[Path, ...]) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
     from . import planner
@@ -88,8 +88,8 @@ def info(roadmap: Path, as_json: bool) -> None:
 
 @cli.command()
 @ROADMAP
-@click.argument("path", required=False, type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="PNG, SVG or PDF.")
+@click.argument("path", required=False, type=FILE)
+@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF.")
 @click.option("--depth", "depths", multiple=True, type=float, help="A depth [m] to draw the current at.")
 def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...]) -> None:
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
@@ -100,9 +100,13 @@ def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ..
 
 
 @cli.command()
-@click.argument("currents", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("currents", nargs=-1, required=True, type=FILE)
 @click.option(
-    "--at", multiple=True, type=Place("LON,LAT,DEPTH[,TIME]", texts=1), help="Sample the current here, as planned with."
+    "--at",
+    multiple=True,
+    type=place_and_time,
+    metavar="LON,LAT,DEPTH[,TIME]",
+    help="Sample the current here.",
 )
 @JSON
 def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> None:
@@ -119,13 +123,17 @@ def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> 
 def main() -> None:
     """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
     try:
-        cli(standalone_mode=False)
+        cli(prog_name="glider-stream", standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
     except click.ClickException as error:
-        _refuse(error.format_message())
+        context = getattr(error, "ctx", None)
+        place = context.command_path if context else "glider-stream"
+        _refuse(f"{error.format_message().rstrip('.')}; see `{place} --help`")
     except OSError as error:
         _refuse(f"{error.filename or 'a file'}: {error.strerror or error}")
+    except MemoryError as error:
+        _refuse(f"there is not enough memory ({error}); make the problem smaller")
     except (click.Abort, KeyboardInterrupt):
         click.echo("glider-stream: stopped", err=True)
         sys.exit(130)

@@ -9,7 +9,7 @@ import numpy as np
 
 from .frame import MAX_SCALE_ERROR, LocalFrame
 from .ocean import Names, OceanFile, divergence_ratio, read_currents, sample
-from .ocean_flow import EARTH
+from .ocean_flow import EARTH, index_map
 
 Place = tuple[float, float, float | None, str | None]
 
@@ -49,6 +49,7 @@ class Description:
     levels: tuple[Level, ...]
     divergence_ratio: float | None
     frame_error: float
+    map_error: float | None
     points: tuple[Point, ...]
 
     @property
@@ -89,6 +90,7 @@ class Description:
             ],
             "divergence_ratio": self.divergence_ratio,
             "frame_scale_error": self.frame_error,
+            "index_map_error_m": self.map_error,
             "notes": list(file.notes),
             "points": [dict(vars(point)) for point in self.points],
         }
@@ -135,9 +137,10 @@ class Description:
     def _frame(self) -> str:
         if self.frame_error > MAX_SCALE_ERROR:
             return "the whole extent is too wide for one flat frame: plan in a part of it"
-        return (
+        told = (
             f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
         )
+        return told if self.map_error is None else f"{told}, by {self.map_error:.2g} m in place"
 
 
 def _ratio(ratio: float | None) -> str:
@@ -171,12 +174,14 @@ def describe(
         int(np.abs(file.depth - d).argmin()) for d in (*DEPTHS, file.depth[-1]) if d <= file.depth[-1]
     )
     lon, lat = (float(file.lon[0]), float(file.lon[-1])), (float(file.lat[0]), float(file.lat[-1]))
-    wide = lon[1] - lon[0] >= 180
+    frame = LocalFrame.over(lon, lat)
+    # half around the globe the stereographic scale has long left every bound
+    frame_error = 1.0 if lon[1] - lon[0] >= 180 else min(1.0, frame.scale_error(lon, lat))
     return Description(
         file=file,
         levels=tuple(_level(file, k) for k in near),
         divergence_ratio=_finite(divergence_ratio(file)),
-        # half around the globe the stereographic scale has long left every bound
-        frame_error=1.0 if wide else LocalFrame.over(lon, lat).scale_error(lon, lat),
+        frame_error=frame_error,
+        map_error=None if frame_error > MAX_SCALE_ERROR else index_map(frame, file.lon, file.lat).error,
         points=tuple(points),
     )

@@ -60,7 +60,8 @@ class GeographicDomain:
     def __post_init__(self) -> None:
         for name in ("lat", "depth"):
             check_range(getattr(self, name), f"domain.{name}")
-        require(self.depth[0] >= 0, f"`domain.depth` must begin at or below the surface, 0; got {self.depth[0]:g}")
+        top = self.depth[0]
+        require(top >= 0, f"`domain.depth` must begin at or below the surface, 0; got {top:g}")
         poleward = max(abs(bound) for bound in self.lat)
         require(poleward <= 85, f"`domain.lat` must stay within 85 degrees of the equator; got {poleward:g}")
         width = self.width
@@ -90,7 +91,9 @@ class GeographicDomain:
     def point(self, values: Point) -> Array:
         """A point of this domain's coordinates, lon, lat, depth, in the local frame (3,) [m]."""
         lon, lat, depth = values
-        require(abs(lat) < 90 and math.isfinite(lon), f"{lon:g}, {lat:g} is no longitude and latitude in degrees")
+        on_earth = abs(lat) < 90 and abs(lon) <= 360
+        require(on_earth, f"{lon:g}, {lat:g} is no longitude and latitude in degrees; give LON,LAT,DEPTH")
+        require(0 <= depth < math.inf, f"the depth must be at least 0 m, downward; got {depth:g}")
         x, y = self.frame().to_local(np.array([lon]), np.array([lat]))
         return np.array([x[0], y[0], -depth])
 
@@ -98,4 +101,5 @@ class GeographicDomain:
 def domain_from_table(table: Mapping[str, Any]) -> BoxDomain | GeographicDomain:
     """The domain of a scenario: geographic where it speaks of lon, lat or depth."""
     geographic = bool({"lon", "lat", "depth"} & set(table))
-    return from_table(GeographicDomain if geographic else BoxDomain, table, "domain")
+    kind: type[BoxDomain | GeographicDomain] = GeographicDomain if geographic else BoxDomain
+    return from_table(kind, table, "domain")

@@ -408,7 +408,7 @@ class _Reader:
         if curved and not any(self.data[n].dims == (d,) for n in places.values() for d in variable.dims):
             raise InputError(
                 f"{self.name} is on a curvilinear grid, longitude `{curved[0]}` is two-dimensional: "
-                "interpolate to a regular longitude-latitude grid first, and turn the currents toward east and north"
+                "interpolate to a regular longitude-latitude grid first, with currents toward east and north"
             )
         dims = [self.data[name].dims for name in places.values()]
         if len(dims) == 2 and dims[0] == dims[1] and len(dims[0]) == 1 and set(dims[0]) <= set(variable.dims):
@@ -603,7 +603,12 @@ class _Reader:
             one = self.data[name]
             if one.size != 1 or set(one.dims) - set(variable.dims) or self._kind(name) != kind:
                 continue
-            if name in own or self._standard(one) in AXIS_NAMES[kind] or name.lower() in AXIS_NAMES[kind]:
+            wind = self._standard(one).startswith(("height", "altitude"))
+            if (
+                (name in own and not wind)
+                or self._standard(one) in AXIS_NAMES[kind]
+                or name.lower() in AXIS_NAMES[kind]
+            ):
                 hits.append(name)
         return hits[0] if hits else None
 
@@ -619,8 +624,9 @@ class _Reader:
             marks = np.unique(values[beyond])
             require(
                 marks.size == 1,
-                f"`{name}` in {self.name} reaches {float(np.abs(marks).max()):.4g} m/s, which no ocean current "
-                'does: name its unit in `names`, such as `units` = "cm/s"',
+                f"`{name}` in {self.name} {'has no unit and ' if factor is None else ''}reaches "
+                f"{float(np.abs(marks).max()):.4g} m/s, which no ocean current does: "
+                'name its unit in `names`, such as `units` = "cm/s"',
             )
             values[beyond] = np.nan
             notes.append(f"`{name}` = {marks[0] / (factor or 1.0):g} is taken as no data")

@@ -23,7 +23,7 @@ HALO = 2
 """Further cells that fill the dry ones of the margin: a value does not depend on where the domain ends."""
 MAP_ERROR = 1.0
 """The index map misplaces no point of the grid by more than this [m] ..."""
-MAP_SIDE = 2049
+MAP_SIDE = 1025
 """... unless it grows beyond this many points on a side; then a hundredth of a cell must do."""
 EVEN = 1e-3
 """An axis this close to even, in cells, is even: the rest is the rounding of its degrees."""
@@ -95,9 +95,10 @@ def columns(lon: Array, centre: float) -> tuple[NDArray[np.intp], Array]:
 
 
 def _span(axis: Array, bounds: Range, margin: int) -> slice:
-    first = int(np.searchsorted(axis, bounds[0], side="right")) - 1
-    last = int(np.searchsorted(axis, bounds[1], side="left"))
-    return slice(max(0, min(first, axis.size - 2) - margin), min(axis.size - 1, max(last, 1) + margin) + 1)
+    """Two points or more: the cells that hold the bounds, and a margin where there is one."""
+    first = max(0, min(int(np.searchsorted(axis, bounds[0], side="right")) - 1, axis.size - 2))
+    last = max(first + 1, min(int(np.searchsorted(axis, bounds[1], side="left")), axis.size - 1))
+    return slice(max(0, first - margin), min(axis.size, last + margin + 1))
 
 
 def _degrees(axis: Array) -> str:
@@ -248,7 +249,7 @@ def index_map(frame: LocalFrame, lon: Array, lat: Array) -> IndexMap:
         side = 2 * side - 1
     require(
         error <= max(MAP_ERROR, 0.01 * cells.min()),
-        f"this grid is too uneven for a flat frame: points would be read {error:.1f} m off",
+        f"the grid is too uneven or too near a pole for a flat frame: points would be read {error:.0f} m off",
     )
     return IndexMap(
         np.ascontiguousarray(known),
@@ -334,7 +335,8 @@ def _build(
     lat: Range,
     depth: Range,
     epoch: str | np.datetime64 | None,
-    clearance: float,
+    clearance: float = 0.0,
+    margin: int = MARGIN,
 ) -> tuple[OceanGrid, Seabed]:
     during, seconds = _seconds(file, epoch)
     axes = (file.lon, file.lat, None if file.surface else file.depth)
@@ -346,8 +348,8 @@ def _build(
     # the halo has done its work once the dry cells are filled; at the file's edge there is none to drop
     west, east = eastward(lon)
     middle = float(wrapped((west + east) / 2, frame.lon))
-    kept_i = _span(lons, (middle - (east - west) / 2, middle + (east - west) / 2), MARGIN)
-    kept_j = _span(lats, lat, MARGIN)
+    kept_i = _span(lons, (middle - (east - west) / 2, middle + (east - west) / 2), margin)
+    kept_j = _span(lats, lat, margin)
     count = file.u[during].shape[0]
     values = np.empty((count, depths.size, kept_i.stop - kept_i.start, kept_j.stop - kept_j.start, 2))
     wet = np.ones((file.depth.size, lons.size, lats.size), dtype=bool)
@@ -438,7 +440,7 @@ def sample(
             return None
         depth = min(depth, float(file.depth[-1]))
     frame = LocalFrame(at_lon, at_lat)
-    flow, seabed = _build(file, frame, (at_lon, at_lon), (at_lat, at_lat), (depth, depth), when, 0.0)
+    flow, seabed = _build(file, frame, (at_lon, at_lon), (at_lat, at_lat), (depth, depth), when, margin=0)
     x, y = (float(part) for part in frame.to_local(at_lon, at_lat))
     if not allowed(seabed, x, y, -depth):
         return None

@@ -9,6 +9,7 @@ from .export import check_export, export_path
 from .query import Path, Planner, load_path
 from .roadmap import Progress, Roadmap, build_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
+from .settings import require
 from .store import check_output, read_roadmap, write_roadmap
 
 if TYPE_CHECKING:
@@ -26,7 +27,15 @@ def build(
     """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says."""
     if output is not None:
         check_output(output)
-    resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
+    if isinstance(scenario, Scenario):
+        require(
+            not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}"
+        )
+        resolved = scenario
+    else:
+        itself = output is not None and File(output).resolve() == File(scenario).resolve()
+        require(not itself, f"the output {output} is the scenario itself; name another file")
+        resolved = read_scenario(scenario, overrides)
     roadmap = build_roadmap(resolved.problem(), threads, progress)
     if output is not None:
         write_roadmap(roadmap, output)

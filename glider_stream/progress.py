@@ -32,4 +32,8 @@ def reporter(what: str) -> Iterator[Callable[[Any], None]]:
         TextColumn(what), BarColumn(), TextColumn("{task.fields[said]}"), console=Console(stderr=True)
     ) as bar:
         task = bar.add_task(what, said="compiling")
-        yield lambda progress: bar.update(task, completed=progress.done, total=progress.total, said=str(progress))
+
+        def update(progress: Any) -> None:
+            bar.update(task, completed=progress.done, total=progress.total, said=str(progress))
+
+        yield update

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path as File
 from typing import Any
 
@@ -11,13 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from .edges import Edge, Status
+from .errors import InputError
 from .flow import flow_sha256
 from .glider import glider_sha256
+from .kernels.edges import Edge, Status
+from .neighbours import Neighbourhood
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
 from .settings import require
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,15 @@ class Leg:
             "trajectory": self.trajectory.tolist(),
         }
 
+    def __str__(self) -> str:
+        way, glide = "climb" if self.glide_angle > 0 else "dive ", math.degrees(self.glide_angle)
+        compass = math.degrees(math.pi / 2 - self.heading) % 360
+        return (
+            f"{self.depart:9,.0f} s  {way} {self.start[2]:7.0f} m to {self.end[2]:6.0f} m  "
+            f"glide {glide:6.1f} deg  compass {compass:5.1f} deg  "
+            f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
+        )
+
 
 @dataclass(frozen=True)
 class Path:
@@ -69,7 +82,7 @@ class Path:
     @property
     def travel_time(self) -> float:
         """Time from start to goal [s]; inf where there is no path."""
-        return sum(leg.duration for leg in self.legs) if self.found else math.inf
+        return sum((leg.duration for leg in self.legs), 0.0) if self.found else math.inf
 
     @property
     def trajectory(self) -> Array:
@@ -86,17 +99,12 @@ class Path:
         }
 
     def __str__(self) -> str:
-        ends = " to ".join("(" + ", ".join(f"{value:.6g}" for value in end) + ")" for end in (self.start, self.goal))
+        start, goal = (f"({x:.6g}, {y:.6g}, {z:.6g})" for x, y, z in (self.start, self.goal))
         if not self.found:
-            return f"no path from {ends}"
-        rows = [f"path from {ends}: {len(self.legs)} legs, {self.travel_time:,.0f} s"]
-        for leg in self.legs:
-            rows.append(
-                f"  {leg.depart:9,.0f} s  {'climb' if leg.glide_angle > 0 else 'dive ':5} {leg.start[2]:7.0f} m to"
-                f" {leg.end[2]:6.0f} m  glide {math.degrees(leg.glide_angle):6.1f} deg  compass"
-                f" {math.degrees(math.pi / 2 - leg.heading) % 360:5.1f} deg  {leg.duration:7,.0f} s  miss {leg.miss:.2f} m"
-            )
-        return "\n".join(rows)
+            return f"no path from {start} to {goal}; more nodes, neighbours or candidates may find one"
+        count = f"{len(self.legs)} leg{'' if len(self.legs) == 1 else 's'}"
+        title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s"
+        return "\n".join([title, *(f"  {leg}" for leg in self.legs)])
 
 
 def load_path(file: str | File) -> Path:
@@ -105,8 +113,8 @@ def load_path(file: str | File) -> Path:
         table = json.loads(File(file).read_text())
         legs = tuple(
             Leg(
-                start=np.array(leg["from"], np.float64),
-                end=np.array(leg["to"], np.float64),
+                start=np.array(leg["from"], np.float64).reshape(3),
+                end=np.array(leg["to"], np.float64).reshape(3),
                 glide_angle=float(leg["glide_angle_rad"]),
                 heading=float(leg["heading_rad"]),
                 speed=float(leg["speed_mps"]),
@@ -120,8 +128,8 @@ def load_path(file: str | File) -> Path:
         cost = float(table["cost"]) if table["found"] else math.inf
     except (OSError, ValueError, KeyError, TypeError) as error:
         said = error.strerror if isinstance(error, OSError) else f"{type(error).__name__} at {error}"
-        require(False, f"the path file {file} cannot be read: {said}; write it with `query -o`")
-    require(bool(legs), f"the path file {file} holds no leg: no path was found, so there is nothing to draw")
+        raise InputError(f"the path file {file} cannot be read: {said}; write it with `query -o`") from None
+    require(bool(legs), f"the path file {file} holds no leg, so there is nothing to draw; query another path")
     return Path(legs[0].start, legs[-1].end, cost, legs)
 
 
@@ -129,7 +137,7 @@ def load_path(file: str | File) -> Path:
 class _Attached:
     """Edges between one point and the nodes of a roadmap: node numbers (n,), rows of `Edge` (n, 7)."""
 
-    nodes: NDArray[np.int64]
+    nodes: Index
     outcomes: Array
 
 
@@ -154,49 +162,54 @@ class Planner:
     def query(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> Path:
         """The cheapest path between two points (3,) [m]; the scenario's own start and goal where None.
 
-        A point that is a node is used as it is; any other is attached by its own neighbours.
+        A point that is a node is used as it is; any other is attached by its own neighbours, and the leg
+        from end to end is looked at, too.
         """
         first, start_at = self._end(start, self.problem.start, "start")
         last, goal_at = self._end(goal, self.problem.goal, "goal")
-        nodes = len(self.roadmap.position)
-        away = self._attach(start_at, departing=True) if first is None else None
-        towards = self._attach(goal_at, departing=False) if last is None else None
-        distance, before = self._search(first, away)
-        if towards is None:
-            assert last is not None
-            cost, end = float(distance[last]), last
-        else:
-            through = distance[towards.nodes] + towards.outcomes[:, 2]
-            cost, end = (float(through.min()), int(np.argmin(through))) if through.size else (math.inf, 0)
-        direct = self.problem.evaluator.connect_pair(start_at, goal_at, self.problem.departure)
-        if (first is None or last is None) and direct.status == Status.CONNECTED and direct.cost < cost:
-            return self._path(start_at, goal_at, direct.cost, [(start_at, goal_at, direct)])
+        if np.array_equal(start_at, goal_at):
+            return Path(start_at, goal_at, 0.0, ())
+        away = None if first.size else self._attach(start_at, departing=True)
+        towards = None if last.size else self._attach(goal_at, departing=False)
+        origin = int(first[0]) if first.size else len(self.roadmap.position)
+        distance, before = self._search(origin, away)
+        ends = last if towards is None else towards.nodes
+        costs = distance[ends] + (0.0 if towards is None else towards.outcomes[:, 2])
+        nearest = int(np.argmin(costs)) if costs.size else 0
+        cost = float(costs[nearest]) if costs.size else math.inf
+        if away is not None or towards is not None:
+            direct = self.problem.evaluator.connect_pair(start_at, goal_at, self.problem.departure)
+            if direct.status == Status.CONNECTED and direct.cost < cost:
+                return self._path(start_at, goal_at, direct.cost, [(start_at, goal_at, direct)])
         if not math.isfinite(cost):
             return Path(start_at, goal_at, math.inf, ())
+        end = int(ends[nearest])
         hops: list[tuple[Array, Array, Edge]] = []
         if towards is not None:
-            node = int(towards.nodes[end])
-            hops.append((self._where(node, start_at), goal_at, _edge(towards.outcomes[end])))
-            end = node
-        origin = nodes if first is None else first
+            hops.append((self._where(end, start_at), goal_at, _edge(towards.outcomes[nearest])))
         while end != origin:
             earlier = int(before[end])
-            hops.append((self._where(earlier, start_at), self._where(end, start_at), self._edge(earlier, end, away)))
+            ends_at = self._where(earlier, start_at), self._where(end, start_at)
+            hops.append((*ends_at, self._edge(earlier, end, away)))
             end = earlier
         return self._path(start_at, goal_at, cost, hops[::-1])
 
-    def _end(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[int | None, Array]:
+    @cached_property
+    def _neighbourhood(self) -> Neighbourhood:
+        return self.problem.neighbourhood(self.roadmap.position)
+
+    def _end(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
+        """The nodes that lie at an end of the query, often none, and where it is."""
         if point is None:
             require(named is not None, f"the scenario names no {name}; give one with --{name} X,Y,Z")
             point = named
         place = np.asarray(point, np.float64)
         require(place.shape == (3,), f"`{name}` must be three numbers X,Y,Z; got {place.tolist()}")
         self.problem.check_point(place, name)
-        same = np.flatnonzero((self.roadmap.position == place).all(axis=1))
-        return (int(same[-1]) if same.size else None), place
+        return np.flatnonzero((self.roadmap.position == place).all(axis=1)), place
 
     def _attach(self, point: Array, departing: bool) -> _Attached:
-        nodes = self.problem.neighbourhood(self.roadmap.position).of(point)
+        nodes = self._neighbourhood.of(point)
         position = np.vstack([self.roadmap.position[nodes], point])
         here, others = len(nodes), np.arange(len(nodes))
         if departing:
@@ -207,8 +220,8 @@ class Planner:
         connected = outcomes[:, 0] == Status.CONNECTED
         return _Attached(nodes[connected], outcomes[connected])
 
-    def _search(self, first: int | None, away: _Attached | None) -> tuple[Array, NDArray[np.int32]]:
-        """Cost from the start to every node, and each node's predecessor; the start is one more node."""
+    def _search(self, origin: int, away: _Attached | None) -> tuple[Array, NDArray[np.int32]]:
+        """Cost from `origin` to every node, and each one's predecessor; an attached start is one more."""
         road, nodes = self.roadmap, len(self.roadmap.position)
         cost, target, indptr = road.cost, road.target, road.indptr
         if away is not None:
@@ -218,9 +231,8 @@ class Planner:
         else:
             indptr = np.append(indptr, indptr[-1])
         graph = csr_array((cost, target, indptr), shape=(nodes + 1, nodes + 1))
-        origin = nodes if first is None else first
-        distance, before = dijkstra(graph, indices=origin, return_predecessors=True)
-        return distance, before
+        distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
+        return distance[0], before[0]
 
     def _where(self, node: int, start: Array) -> Array:
         return start if node == len(self.roadmap.position) else self.roadmap.position[node]
@@ -238,11 +250,8 @@ class Planner:
         for source, target, edge in hops:
             rows = self.problem.evaluator.trace(source, edge, self.problem.departure)
             rows[:, 0] += clock - self.problem.departure
-            legs.append(
-                Leg(
-                    source, target, edge.glide_angle, edge.heading, edge.speed, clock, edge.time, edge.miss, rows
-                )
-            )
+            control = edge.glide_angle, edge.heading, edge.speed
+            legs.append(Leg(source, target, *control, clock, edge.time, edge.miss, rows))
             clock += edge.time
         return Path(start, goal, cost, tuple(legs))
 

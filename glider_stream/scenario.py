@@ -1,8 +1,9 @@
 """Scenarios: TOML into objects, every key checked; the problem that they make."""
 
+import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,14 @@ class TravelTime:
 
 
 COSTS: dict[str, type[TravelTime]] = {"time": TravelTime}
+KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
+    "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
+    "sampling": ("kind", SAMPLERS),
+    "neighbours": ("kind", NEIGHBOURS),
+    "steering": ("method", METHODS),
+    "cost": ("kind", COSTS),
+}
+"""The sections that come in kinds: the key that selects, and its choices."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +72,9 @@ class Scenario:
         table, frame = polar(self.glider), self.domain.frame()
         horizon = self.integration.dt * self.integration.steps
         flow, terrain, words = self._waters(float(table.best_horizontal.max()) * horizon, horizon)
-        require(
-            flow.t_lo <= self.departure <= flow.t_hi,
-            f"`query.departure` = {self.departure:g} s lies outside the times of the flow, {flow.t_lo:g} to {flow.t_hi:g} s",
-        )
+        times = f"the times of the flow, {flow.t_lo:g} to {flow.t_hi:g} s"
+        within = flow.t_lo <= self.departure <= flow.t_hi
+        require(within, f"`query.departure` = {self.departure:g} s lies outside {times}; choose one of them")
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
         words += f", at most {flow.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
@@ -83,7 +91,7 @@ class Scenario:
             scenario=self.text,
             flow_words=words,
             glider_words=str(self.glider),
-            to_lonlat=None if frame is None else lambda xyz: np.stack(frame.to_lonlat(xyz[:, 0], xyz[:, 1]), axis=-1),
+            to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
         )
 
     @property
@@ -105,7 +113,7 @@ class Scenario:
         if self.flow.sampled is not None:
             # no path between two nodes strays further from the box than half of what a leg can cover
             stray = (glide + flow.max_speed * horizon) / 2
-            x, y, z = ((lo[n] - stray, hi[n] + stray) for n in range(3))
+            x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
             flow = sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
         kind = next(name for name, one in FLOWS.items() if one is type(self.flow))
         words = kind if self.flow.sampled is None else f"{kind}, sampled every {list(self.flow.sampled)} m"
@@ -119,21 +127,27 @@ def shipped_scenarios() -> dict[str, Path]:
 
 
 def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
-    """A scenario from a TOML file, or a shipped one by its name; `overrides`: section.key=value."""
+    """A scenario from a TOML file, or a shipped one by its name.
+
+    `overrides` are section.key=value each. Where they choose another kind of a section, the keys of the old
+    kind that the new one does not know are dropped, but for those overridden themselves. File names in the
+    scenario are relative to its folder, in overrides to the working directory.
+    """
     path = Path(name)
-    if not path.exists() and str(name) in shipped_scenarios():
+    if not path.is_file() and str(name) in shipped_scenarios():
         path = shipped_scenarios()[str(name)]
     shipped = ", ".join(shipped_scenarios())
     require(path.is_file(), f"the scenario {name} is no file, and none of those shipped: {shipped}")
     try:
-        text = path.read_text(encoding="utf-8")
-        table = tomllib.loads(text)
+        # some editors begin a file with a byte order mark
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"the scenario {name} cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"the scenario {name} is not valid TOML: {error}") from None
-    for override in overrides:
-        _set(table, override)
+    except UnicodeDecodeError as error:
+        raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as such") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"the scenario {name} is not valid TOML: {error}; mend that place") from None
+    _override(table, overrides)
     return scenario_from_table(table, path.parent)
 
 
@@ -152,37 +166,70 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         require(isinstance(block, Mapping), f"`{name}` must be a section, [{name}]; got {block!r}")
     for name in SECTIONS:
         require(name in table or name == "query", f"the section [{name}] is missing; add it")
-    flow = dict(table["flow"])
-    if flow.get("kind") == "netcdf" and isinstance(flow.get("file"), (str, list)):
-        names = [flow["file"]] if isinstance(flow["file"], str) else flow["file"]
-        flow["file"] = [str((folder / str(name)).absolute()) for name in names]
-    flow_kinds: dict[str, type[AnalyticFlow | OceanFlow]] = {**FLOWS, "netcdf": OceanFlow}
+    table = {**table, "flow": _located(table["flow"], folder)}
+    blocks: dict[str, Any] = {
+        name: from_kinds(kinds, table[name], name, selector) for name, (selector, kinds) in KINDS.items()
+    }
     return Scenario(
         domain=domain_from_table(table["domain"]),
-        flow=from_kinds(flow_kinds, flow, "flow"),
+        flow=blocks["flow"],
         glider=glider_from_table(table["glider"]),
-        sampler=from_kinds(SAMPLERS, table["sampling"], "sampling"),
-        law=from_kinds(NEIGHBOURS, table["neighbours"], "neighbours"),
-        method=from_kinds(METHODS, table["steering"], "steering", selector="method"),
+        sampler=blocks["sampling"],
+        law=blocks["neighbours"],
+        method=blocks["steering"],
         integration=from_table(IntegrationSettings, table["integration"], "integration"),
-        cost=from_kinds(COSTS, table["cost"], "cost"),
+        cost=blocks["cost"],
         query=from_table(QueryPoints, table["query"], "query") if "query" in table else None,
-        text=to_toml({**table, "flow": flow}),
+        text=to_toml(table),
     )
 
 
-def _set(table: dict[str, Any], override: str) -> None:
+def _located(flow: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The [flow] table with its file names made absolute."""
+    file = flow.get("file")
+    names = [file] if isinstance(file, str) else file
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return dict(flow)
+    return {**flow, "file": [str((folder / name).absolute()) for name in names]}
+
+
+def _override(table: dict[str, Any], overrides: Sequence[str]) -> None:
+    """Set each section.key=value, and drop the keys of kinds that are no longer chosen."""
+    before = {section: _kind_keys(table, section) for section in KINDS}
+    given = [_set(table, override) for override in overrides]
+    if ["flow", "file"] in given:
+        table["flow"] = _located(table["flow"], Path())
+    for section, keys in before.items():
+        for key in keys - _kind_keys(table, section):
+            if key in table[section] and not any(place[:2] == [section, key] for place in given):
+                del table[section][key]
+
+
+def _kind_keys(table: Mapping[str, Any], section: str) -> set[str]:
+    """The keys that the chosen kind of a section knows; none where the choice is not known."""
+    selector, kinds = KINDS[section]
+    block = table.get(section)
+    name = block.get(selector) if isinstance(block, dict) else None
+    kind = kinds.get(name) if isinstance(name, str) else None
+    return {field.name for field in fields(kind) if field.init} if kind else set()
+
+
+def _set(table: dict[str, Any], override: str) -> list[str]:
+    """Put a value, TOML or else a bare text, in its place, and return the place."""
     place, equals, text = override.partition("=")
-    keys = place.strip().split(".")
-    require(bool(equals) and len(keys) >= 2 and all(keys), f"`--set` takes section.key=value; got {override!r}")
+    keys = [key.strip() for key in place.split(".")]
+    well = bool(equals) and len(keys) >= 2 and all(keys) and "\n" not in override
+    require(well, f"`--set` takes section.key=value; got {override!r}")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         value = text.strip()
     for key in keys[:-1]:
         table = table.setdefault(key, {})
-        require(isinstance(table, dict), f"`--set {override}`: `{key}` is no section")
+        section = isinstance(table, dict)
+        require(section, f"`--set` takes section.key=value, and `{key}` is no section; got {override!r}")
     table[keys[-1]] = value
+    return keys
 
 
 def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
@@ -205,5 +252,5 @@ def _toml_value(value: Any) -> str:
         return repr(value)
     if isinstance(value, list):
         return "[" + ", ".join(_toml_value(one) for one in value) + "]"
-    escaped = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+    # JSON escapes as TOML does, but for one character
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -4,7 +4,7 @@ A block of a scenario is a frozen dataclass: a field without a default is a requ
 the key's type, its `__post_init__` checks the value. A new kind is one dataclass and one table row.
 """
 
-import math
+import sys
 import types
 import typing
 from collections.abc import Mapping
@@ -14,6 +14,9 @@ from typing import Any, TypeVar
 from .errors import InputError
 
 T = TypeVar("T")
+LARGEST_FLOAT = sys.float_info.max
+LARGEST_INT = 2**53
+"""Whole numbers up to here are exact as floats, too; TOML knows no limit."""
 
 
 def _described(kind: Any) -> str:
@@ -51,9 +54,14 @@ def _fits(value: Any, kind: Any, where: str) -> Any:
         if isinstance(value, Mapping):
             return from_table(typing.cast(type, kind), value, where)
     elif kind is float:
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        # False for NaN, too
+        if not isinstance(value, bool) and isinstance(value, (int, float)) and abs(value) <= LARGEST_FLOAT:
             return float(value)
-    elif isinstance(value, kind) and (kind is bool or not isinstance(value, bool)):
+    elif kind is int:
+        if not isinstance(value, bool) and isinstance(value, int):
+            require(abs(value) <= LARGEST_INT, f"`{where}` must be at most 2^53; got {value}")
+            return value
+    elif isinstance(value, kind):
         return value
     raise InputError(f"`{where}` must be {_described(kind)}; got {value!r}")
 
@@ -65,7 +73,7 @@ def _known(name: str, choices: typing.Iterable[str], what: str) -> None:
 
 
 def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
-    """An object of the dataclass `kind` from a table; InputError names a key unknown, missing or ill-typed."""
+    """An object of the dataclass `kind` from a table; InputError names a key unknown, missing or wrong."""
     hints = typing.get_type_hints(kind)
     keys = {f.name: f for f in fields(typing.cast(Any, kind)) if f.init}
     for key in table:

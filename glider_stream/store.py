@@ -11,8 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .edges import Status
 from .errors import InputError
+from .kernels.edges import Status
 from .roadmap import EDGE_FIELDS, Provenance, Roadmap
 from .settings import require
 
@@ -37,11 +37,13 @@ def check_output(path: str | Path) -> None:
     """InputError unless a file can be made at `path`: before the work, not after it."""
     path = Path(path)
     require(not path.is_dir(), f"the output {path} is a folder; name a file")
+    # a device such as /dev/null would be replaced by a file
+    require(path.is_file() or not path.exists(), f"the output {path} is no ordinary file; name another")
     require(path.parent.is_dir(), f"the output folder {path.parent} does not exist; make it first")
     try:
         tempfile.TemporaryFile(dir=path.parent).close()
     except OSError as error:
-        raise InputError(f"the output {path} cannot be written: {error.strerror}") from None
+        raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
 
 
 @contextlib.contextmanager
@@ -64,29 +66,38 @@ def replacing(path: Path) -> Iterator[Path]:
 
 def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
     """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
+    try:
+        with replacing(Path(path)) as temporary, h5py.File(temporary, "w") as file:
+            _write(file, roadmap)
+    except (OSError, RuntimeError):
+        # of a full disk HDF5 says, for one, that it cannot decrement a count
+        room = "make room on its disk, or name another output"
+        raise InputError(f"the roadmap {path} cannot be written whole; {room}") from None
+
+
+def _write(file: h5py.File, roadmap: Roadmap) -> None:
     arrays: dict[str, Any] = {"nodes/position": roadmap.position, "edges/indptr": roadmap.indptr}
     arrays |= {f"edges/{name}": getattr(roadmap, name) for name in ("target", *EDGE_FIELDS)}
     if roadmap.lonlat is not None:
         arrays["nodes/lonlat"] = roadmap.lonlat
-    with replacing(Path(path)) as temporary, h5py.File(temporary, "w") as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = VERSION
-        for name, value in asdict(roadmap.provenance).items():
-            file.attrs[name] = value
-        for name, array in arrays.items():
-            kind, unit, words = _DESCRIBED[name]
-            # a dataset without elements cannot be chunked, and so not be checksummed
-            checked = {"fletcher32": True, "chunks": True} if array.size else {}
-            dataset = file.create_dataset(name, data=array.astype(kind), **checked)
-            dataset.attrs["units"] = unit
-            dataset.attrs["long_name"] = words
-        pairs = file.create_group("pairs")
-        pairs.attrs["evaluated"] = roadmap.evaluated
-        for name, count in roadmap.counts.items():
-            pairs.attrs[name] = count
-        pairs.attrs["wall_s"] = roadmap.wall_s
-        pairs.attrs["threads"] = roadmap.threads
-        file.attrs["complete"] = True
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = VERSION
+    for name, value in asdict(roadmap.provenance).items():
+        file.attrs[name] = value
+    for name, array in arrays.items():
+        kind, unit, words = _DESCRIBED[name]
+        # a dataset without elements cannot be chunked, and so not be checksummed
+        checked = {"fletcher32": True, "chunks": True} if array.size else {}
+        dataset = file.create_dataset(name, data=array.astype(kind), **checked)
+        dataset.attrs["units"] = unit
+        dataset.attrs["long_name"] = words
+    pairs = file.create_group("pairs")
+    pairs.attrs["evaluated"] = roadmap.evaluated
+    for name, count in roadmap.counts.items():
+        pairs.attrs[name] = count
+    pairs.attrs["wall_s"] = roadmap.wall_s
+    pairs.attrs["threads"] = roadmap.threads
+    file.attrs["complete"] = True
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
@@ -98,6 +109,8 @@ def read_roadmap(path: str | Path) -> Roadmap:
             return _read(file, path)
     except (OSError, RuntimeError) as error:
         reason = "a checksum fails" if "filter" in str(error) else "it is no HDF5 file, or it is cut short"
+        if isinstance(error, OSError) and error.errno:
+            reason = os.strerror(error.errno).lower()
         raise InputError(f"the roadmap {path} cannot be read: {reason}; build it again") from None
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
@@ -107,19 +120,23 @@ def read_roadmap(path: str | Path) -> Roadmap:
 
 def _read(file: h5py.File, path: Path) -> Roadmap:
     said = file.attrs.get("format")
-    require(said == FORMAT, f"{path} is not a roadmap: its format is {said!r}, not {FORMAT!r}")
-    newest = int(file.attrs["format_version"])
+    what = "none" if said is None else repr(said)
+    require(said == FORMAT, f"{path} is not a roadmap, its format is {what}; give a file that `build` wrote")
+    version = int(file.attrs["format_version"])
     require(
-        newest == VERSION, f"the roadmap {path} has format version {newest}; this program reads version {VERSION}"
+        version == VERSION,
+        f"the roadmap {path} has format version {version}, this program reads version {VERSION}; "
+        + ("update the program" if version > VERSION else "build it again"),
     )
     require(bool(file.attrs.get("complete", False)), f"the roadmap {path} is incomplete; build it again")
     arrays = {}
     for name, (kind, _, _) in _DESCRIBED.items():
         if name == "nodes/lonlat" and name not in file:
             continue
-        require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}")
+        require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
         arrays[name] = np.asarray(file[name][()], dtype=kind)
-    position, indptr, target = (arrays[f"{name}"] for name in ("nodes/position", "edges/indptr", "edges/target"))
+    position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]
+    lonlat = arrays.get("nodes/lonlat")
     nodes, edges = len(position), target.size
     whole = (
         position.shape == (nodes, 3)
@@ -128,11 +145,13 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
         and indptr[-1] == edges
         and bool((np.diff(indptr) >= 0).all())
         and all(arrays[f"edges/{name}"].shape == (edges,) for name in EDGE_FIELDS)
-        and (edges == 0 or bool(0 <= target.min() and target.max() < nodes))
+        and target.shape == (edges,)
+        and (edges == 0 or bool(target.min() >= 0 and target.max() < nodes))
+        and (lonlat is None or lonlat.shape == (nodes, 2))
     )
-    require(whole, f"the roadmap {path} is damaged: its datasets do not fit each other")
-    costs = arrays["edges/cost"]
-    require(bool((costs >= 0).all()), f"the roadmap {path} is damaged: it holds a cost below 0 or NaN")
+    require(whole, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
+    sound = bool((arrays["edges/cost"] >= 0).all())
+    require(sound, f"the roadmap {path} is damaged: it holds a cost below 0 or NaN; build it again")
     pairs = file["pairs"].attrs
     return Roadmap(
         position=position,
@@ -146,5 +165,5 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
         ),
         wall_s=float(pairs["wall_s"]),
         threads=int(pairs["threads"]),
-        lonlat=arrays.get("nodes/lonlat"),
+        lonlat=lonlat,
     )
