@@ -41,7 +41,7 @@ def check_output(path: str | Path) -> None:
     require(path.is_file() or not path.exists(), f"the output {path} is no ordinary file; name another")
     require(path.parent.is_dir(), f"the output folder {path.parent} does not exist; make it first")
     try:
-        tempfile.TemporaryFile(dir=path.parent).close()
+        tempfile.TemporaryFile(dir=path.resolve().parent).close()
     except OSError as error:
         raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
 
@@ -50,6 +50,7 @@ def check_output(path: str | Path) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary name beside `path`, moved into its place when the block ends well, else removed."""
     check_output(path)
+    path = path.resolve()  # a link stays one
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)

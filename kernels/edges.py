@@ -15,10 +15,13 @@ from .control import (
     angle_of_vertical_speed,
     candidate_controls,
     control_towards,
+    vertical_speed,
 )
 from .cost import edge_cost
+from .fan import fan_guesses
 from .flow import contains
-from .motion import arrival_window, closest_approach, is_clear
+from .motion import LANES, arrival_window, closest_approach, is_clear
+from .steer import steer_lanes
 
 
 class Status(IntEnum):
@@ -43,6 +46,12 @@ OUTSIDE_FLOW = int(Status.OUTSIDE_FLOW)
 
 CLEARANCE_SPACING = 5.0
 """How closely [m] a leg is looked at for land and seabed."""
+MAX_TRIES = 12
+"""Guesses that are polished for one target."""
+FAN_STEP = 2.0
+"""Steps of a fan, in steps of a leg: it gives first guesses."""
+INSIDE = 1e-9
+"""A guess this little outside its triangle is inside."""
 
 
 class Edge(NamedTuple):
@@ -121,7 +130,12 @@ def connect_node(flow, terrain, polar, steering, integration, position, departur
         edge = connect(
             flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q, z_q, departure[node], controls
         )
-        edges[n] = (float(edge.status), edge.time, edge.cost, edge.glide_angle, edge.heading, edge.speed, edge.miss)
+        _store(edges, n, edge)
+
+
+@njit(inline="always")
+def _store(edges, n, edge):
+    edges[n] = (float(edge.status), edge.time, edge.cost, edge.glide_angle, edge.heading, edge.speed, edge.miss)
 
 
 @entry_point(parallel=True)
@@ -136,4 +150,141 @@ def connect_all(flow, terrain, polar, steering, integration, position, departure
         connect_node(
             flow, terrain, polar, steering, integration, position, departure, source[n], target[row], edges[row]
         )
+    return edges
+
+
+@njit
+def polish(flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, lanes):
+    """The cheapest exact leg for each node among first guesses, between it and (x, y, z).
+
+    Of a node's guesses those inside a cell go first, earliest first, then those outside, nearest first.
+    Returns rows (nodes, 1 + fields of Edge), the node first.
+    """
+    horizon = integration.dt * integration.steps
+    time = np.empty(count)
+    key = np.empty(count)
+    for n in range(count):
+        time[n] = abs(position[int(guesses[n, 0]), 2] - z) / vertical_speed(polar, direction, guesses[n, 1])
+        rank = time[n] / (4.0 * horizon) if guesses[n, 3] <= INSIDE else 0.5 + 0.5 * min(guesses[n, 3], 0.9)
+        key[n] = guesses[n, 0] + min(rank, 0.99)
+    order = np.argsort(key, kind="mergesort")
+    begin = np.empty(count + 1, np.int64)
+    groups = 0
+    for n in range(count):
+        if n == 0 or guesses[order[n], 0] != guesses[order[n - 1], 0]:
+            begin[groups] = n
+            groups += 1
+    begin[groups] = count
+    cursor = begin[:groups].copy()
+    result = np.empty((groups, 8))
+    for g in range(groups):
+        result[g, 0] = guesses[order[begin[g]], 0]
+        _store(result[:, 1:], g, no_edge(NO_HIT))
+    origin = np.empty((3, LANES))
+    target = np.empty((3, LANES))
+    angle = np.empty(LANES)
+    heading = np.empty(LANES)
+    inverse = np.empty((4, LANES))
+    found = np.empty((2, LANES))
+    pending = np.arange(groups)
+    while pending.size > 0:
+        for first in range(0, pending.size, LANES):
+            used = min(LANES, pending.size - first)
+            for n in range(LANES):
+                g = pending[first + min(n, used - 1)]
+                guess = guesses[order[cursor[g]]]
+                node = int(guess[0])
+                near, far = (target, origin) if backward else (origin, target)
+                near[0, n], near[1, n], near[2, n] = x, y, z
+                far[0, n], far[1, n], far[2, n] = position[node]
+                angle[n], heading[n] = guess[1], guess[2]
+                for m in range(4):
+                    inverse[m, n] = -guess[4 + m] if backward else guess[4 + m]
+            steer_lanes(
+                flow, polar, direction, origin, target, t, angle, heading, inverse,
+                integration.dt, horizon, found, lanes,
+            )  # fmt: skip
+            for n in range(used):
+                g = pending[first + n]
+                cursor[g] += 1
+                known = result[g, 1] == CONNECTED
+                if found[0, n] == math.inf or (known and edge_cost(found[1, n]) >= result[g, 3]):
+                    continue
+                c = control_towards(polar, direction, angle[n], heading[n])
+                clear = is_clear(
+                    flow, terrain, origin[0, n], origin[1, n], origin[2, n], t, c.u, c.v, c.w, found[1, n],
+                    integration.dt, CLEARANCE_SPACING,
+                )  # fmt: skip
+                if clear:
+                    cost = edge_cost(found[1, n])
+                    edge = Edge(CONNECTED, found[1, n], cost, c.glide_angle, c.heading, c.speed, found[0, n])
+                    _store(result[:, 1:], g, edge)
+                elif not known:
+                    result[g, 1] = BLOCKED
+        left = 0
+        for n in range(pending.size):
+            g = pending[n]
+            if cursor[g] == begin[g + 1] or cursor[g] - begin[g] == MAX_TRIES:
+                continue
+            following = order[cursor[g]]
+            if result[g, 1] == CONNECTED and (
+                guesses[following, 3] > INSIDE or edge_cost(time[following]) >= result[g, 3]
+            ):
+                continue
+            pending[left] = g
+            left += 1
+        pending = pending[:left]
+    return result
+
+
+@njit
+def connect_by_fan(flow, terrain, polar, steering, bins, integration, position, wanted, backward, x, y, z, t, lanes):
+    """The cheapest exact legs between (x, y, z) and the wanted nodes, both directions; rows as `polish`."""
+    horizon = integration.dt * integration.steps
+    lowest, highest = z, z
+    for n in range(position.shape[0]):
+        if wanted[n]:
+            lowest = min(lowest, position[n, 2])
+            highest = max(highest, position[n, 2])
+    found = np.empty((0, 8))
+    for direction in range(2):
+        outward = 1 - direction if backward else direction
+        deepest = highest if outward == CLIMB else lowest
+        guesses, count = fan_guesses(
+            flow, polar, steering, bins, position, wanted, direction, backward, x, y, z, t, deepest,
+            integration.dt * FAN_STEP, horizon, lanes,
+        )  # fmt: skip
+        rows = polish(
+            flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, lanes
+        )
+        found = np.concatenate((found, rows))
+    return found
+
+
+@entry_point(parallel=True)
+def connect_all_by_fan(
+    flow, terrain, polar, steering, bins, integration, position, departure, source, indptr, target
+):
+    """As `connect_all`, by the flow map: one fan per source node and direction serves all its targets."""
+    edges = np.empty((target.size, 7))
+    for n in prange(source.size):
+        node = source[n]
+        x, y, z = position[node]
+        t = departure[node]
+        wanted = np.zeros(position.shape[0], np.int64)
+        for k in range(indptr[n], indptr[n + 1]):
+            q = target[k]
+            direction = CLIMB if position[q, 2] > z else DIVE
+            status = quick_status(
+                flow, polar, direction, x, y, z, position[q, 0], position[q, 1], position[q, 2], t, integration
+            )
+            _store(edges, k, no_edge(NO_HIT if status == CONNECTED else status))
+            if status == CONNECTED:
+                wanted[q] = k + 1
+        lanes = np.empty((22, LANES))
+        rows = connect_by_fan(
+            flow, terrain, polar, steering, bins, integration, position, wanted, False, x, y, z, t, lanes
+        )
+        for r in range(rows.shape[0]):
+            edges[wanted[int(rows[r, 0])] - 1] = rows[r, 1:]
     return edges

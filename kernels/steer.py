@@ -1,0 +1,113 @@
+"""Steering: Broyden steps from a guess to the control that lands on a target, LANES problems at once."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from .control import glide_speed
+from .motion import LANES, rk4_lanes
+
+LANDING_TOLERANCE = 0.005
+"""A landing this close to its target [m] is a hit: half of what an edge may miss by."""
+MAX_ITERATIONS = 14
+MAX_TURN = 0.35
+"""Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
+
+
+@njit
+def land_lanes(flow, polar, direction, origin, z_target, t, angle, heading, dt, lanes):
+    """Where LANES controls land at their target depths: into lanes[0], lanes[1]; times into lanes[9] [s].
+
+    `origin` (3, LANES) [m], all left at time t [s]. Steps of `dt` and a last, shorter one, as `motion.trace`.
+    """
+    x, y, z, clock, u, v, w, h, time = (
+        lanes[0], lanes[1], lanes[2], lanes[3], lanes[4], lanes[5], lanes[6], lanes[7], lanes[9]
+    )  # fmt: skip
+    work = lanes[10:18]
+    sign = 2.0 * direction - 1.0
+    longest = 0.0
+    for n in range(LANES):
+        speed = glide_speed(polar, direction, angle[n])
+        along = speed * math.cos(angle[n])
+        u[n] = along * math.cos(heading[n])
+        v[n] = along * math.sin(heading[n])
+        w[n] = speed * math.sin(sign * angle[n])
+        x[n], y[n], z[n] = origin[0, n], origin[1, n], origin[2, n]
+        time[n] = (z_target[n] - z[n]) / w[n]
+        longest = max(longest, time[n])
+    for step in range(int(longest / dt) + 1):
+        for n in range(LANES):
+            clock[n] = t + step * dt
+            z[n] = origin[2, n] + step * dt * w[n]
+            h[n] = min(dt, max(0.0, time[n] - step * dt))
+        rk4_lanes(flow, x, y, z, clock, u, v, w, h, work)
+
+
+@njit
+def steer_lanes(flow, polar, direction, origin, target, t, angle, heading, inverse, dt, horizon, found, lanes):
+    """Polish LANES guesses in place: `angle`, `heading` [rad], so that each lands on its target (3, LANES).
+
+    `inverse` (4, LANES): d(angle, heading) / d(x, y) of the flow map near each guess, row by row.
+    `found` (3, LANES): miss [m], inf where the steps did not close in or the horizon [s] is passed; time [s].
+    """
+    low, high = polar.shallowest[direction], polar.steepest[direction]
+    miss_x, miss_y, da, dh = lanes[18], lanes[19], lanes[20], lanes[21]
+    open_lanes = np.ones(LANES, np.bool_)
+    for n in range(LANES):
+        found[0, n] = math.inf
+    for iteration in range(MAX_ITERATIONS):
+        land_lanes(flow, polar, direction, origin, target[2], t, angle, heading, dt, lanes)
+        any_open = False
+        for n in range(LANES):
+            if not open_lanes[n]:
+                continue
+            rx = lanes[0, n] - target[0, n]
+            ry = lanes[1, n] - target[1, n]
+            miss = math.hypot(rx, ry)
+            if miss <= LANDING_TOLERANCE or not miss < math.inf:
+                open_lanes[n] = False
+                if miss <= LANDING_TOLERANCE and lanes[9, n] <= horizon:
+                    found[0, n] = miss
+                    found[1, n] = lanes[9, n]
+                continue
+            if iteration > 0:
+                _broyden(inverse, n, da[n], dh[n], rx - miss_x[n], ry - miss_y[n])
+            miss_x[n], miss_y[n] = rx, ry
+            step_angle = -(inverse[0, n] * rx + inverse[1, n] * ry)
+            step_heading = -(inverse[2, n] * rx + inverse[3, n] * ry)
+            longest = max(abs(step_angle), abs(step_heading))
+            if longest > MAX_TURN:
+                step_angle *= MAX_TURN / longest
+                step_heading *= MAX_TURN / longest
+            next_angle = min(max(angle[n] + step_angle, low), high)
+            da[n], dh[n] = next_angle - angle[n], step_heading
+            if not (da[n] != 0.0 or dh[n] != 0.0):
+                open_lanes[n] = False
+                continue
+            angle[n] = next_angle
+            heading[n] += step_heading
+            any_open = True
+        if not any_open:
+            break
+    for n in range(LANES):
+        heading[n] = math.atan2(math.sin(heading[n]), math.cos(heading[n]))
+
+
+@njit(inline="always")
+def _broyden(inverse, n, da, dh, dx, dy):
+    """Broyden's update of the inverse Jacobian (Sherman-Morrison): it now maps (dx, dy) to (da, dh)."""
+    ja = inverse[0, n] * dx + inverse[1, n] * dy
+    jh = inverse[2, n] * dx + inverse[3, n] * dy
+    # row vector s^T J^-1
+    rx = da * inverse[0, n] + dh * inverse[2, n]
+    ry = da * inverse[1, n] + dh * inverse[3, n]
+    scale = da * ja + dh * jh
+    if abs(scale) < 1e-30:
+        return
+    ea = (da - ja) / scale
+    eh = (dh - jh) / scale
+    inverse[0, n] += ea * rx
+    inverse[1, n] += ea * ry
+    inverse[2, n] += eh * rx
+    inverse[3, n] += eh * ry
