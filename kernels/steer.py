@@ -11,6 +11,8 @@ from .motion import LANES, rk4_lanes
 LANDING_TOLERANCE = 0.005
 """A landing this close to its target [m] is a hit: half of what an edge may miss by."""
 MAX_ITERATIONS = 14
+GIVE_UP = 5
+"""By this iteration a guess that leads anywhere has cut its miss to a quarter."""
 MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
@@ -52,7 +54,7 @@ def steer_lanes(flow, polar, direction, origin, target, t, angle, heading, inver
     `found` (3, LANES): miss [m], inf where the steps did not close in or the horizon [s] is passed; time [s].
     """
     low, high = polar.shallowest[direction], polar.steepest[direction]
-    miss_x, miss_y, da, dh = lanes[18], lanes[19], lanes[20], lanes[21]
+    miss_x, miss_y, da, dh, first_miss = lanes[18], lanes[19], lanes[20], lanes[21], lanes[8]
     open_lanes = np.ones(LANES, np.bool_)
     for n in range(LANES):
         found[0, n] = math.inf
@@ -71,7 +73,12 @@ def steer_lanes(flow, polar, direction, origin, target, t, angle, heading, inver
                     found[0, n] = miss
                     found[1, n] = lanes[9, n]
                 continue
-            if iteration > 0:
+            if iteration == GIVE_UP and miss > 0.25 * first_miss[n]:
+                open_lanes[n] = False
+                continue
+            if iteration == 0:
+                first_miss[n] = miss
+            else:
                 _broyden(inverse, n, da[n], dh[n], rx - miss_x[n], ry - miss_y[n])
             miss_x[n], miss_y[n] = rx, ry
             step_angle = -(inverse[0, n] * rx + inverse[1, n] * ry)

@@ -231,17 +231,15 @@ def test_no_path_is_an_answer(tmp_path):
     assert not planner.query(road, (1, 2, -3), (100, 20, -30)).found
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("speed = 0.4", "speed = 0.5", "the flow has changed"),
-        ('"paper"', '"slocum"', "the glider has changed"),
-    ],
-)
-def test_a_changed_flow_or_glider_is_refused(old, new, said):
-    changed = scenario_from_text(SCENARIO.replace(old, new)).problem()
-    with pytest.raises(InputError, match=f"{said}.*build the roadmap again"):
-        Planner(roadmap(), changed)
+def test_a_changed_flow_or_glider_is_refused(problem):
+    def changed(old, new):
+        return scenario_from_text(SCENARIO.replace(old, new)).problem().evaluator
+
+    faster = replace(problem.evaluator, flow=changed("speed = 0.4", "speed = 0.5").flow)
+    slower = replace(problem.evaluator, polar=changed('"paper"', '"slocum"').polar)
+    for name, evaluator in (("flow", faster), ("glider", slower)):
+        with pytest.raises(InputError, match=f"the {name} has changed .*; build the roadmap again"):
+            Planner(roadmap(), replace(problem, evaluator=evaluator))
 
 
 def test_a_departure_shifts_no_clock(tmp_path):
