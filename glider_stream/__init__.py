@@ -1,10 +1,10 @@
 """Underwater glider planning in ocean currents: exact legs, roadmaps, routes.
 
-    from glider_stream import planner
+from glider_stream import planner
 
-    roadmap = planner.build("seed-box", "seed-box.h5")
-    path = planner.query(roadmap)
-    planner.plot(roadmap, path, "route.png")
+roadmap = planner.build("seed-box", "seed-box.h5")
+path = planner.query(roadmap)
+planner.plot(roadmap, path, "route.png")
 """
 
 import importlib

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -14,6 +15,8 @@ from .kernels.edges import Edge, Status
 from .settings import require
 
 Array = NDArray[np.float64]
+_CONFIG: Any = numba.config  # its settings are made at run time
+MAX_CANDIDATES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,8 @@ class StreamlineMethod:
     candidates: int
 
     def __post_init__(self) -> None:
-        require(self.candidates >= 1, f"`steering.candidates` must be at least 1; got {self.candidates}")
+        fits = 1 <= self.candidates <= MAX_CANDIDATES
+        require(fits, f"`steering.candidates` must be from 1 to {MAX_CANDIDATES:,}; got {self.candidates}")
 
     def kernel(self) -> control.Steering:
         """As the kernels read it."""
@@ -71,7 +75,12 @@ class Evaluator:
     integration: IntegrationSettings
 
     def connect(
-        self, position: ArrayLike, departure: ArrayLike, source: ArrayLike, indptr: ArrayLike, target: ArrayLike
+        self,
+        position: ArrayLike,
+        departure: ArrayLike,
+        source: ArrayLike,
+        indptr: ArrayLike,
+        target: ArrayLike,
     ) -> Array:
         """Outcomes of all pairs (source[n], target[indptr[n]:indptr[n + 1]]): rows in the order of `Edge`.
 
@@ -79,15 +88,20 @@ class Evaluator:
         target (pairs,) node numbers. Status first (see `Status`); time [s], cost, glide angle, heading [rad],
         speed [m/s], miss [m], NaN where the pair is not connected.
         """
-        nodes = np.ascontiguousarray(position, np.float64)
-        require(nodes.ndim == 2 and nodes.shape[1] == 3, f"`position` must have shape (n, 3); got {nodes.shape}")
+        # writeable arrays, always: Numba compiles read-only ones apart
+        nodes = np.require(position, np.float64, ["C", "W"])
+        require(
+            nodes.ndim == 2 and nodes.shape[1] == 3, f"`position` must have shape (n, 3); got {nodes.shape}"
+        )
         require(bool(np.isfinite(nodes).all()), "`position` must be finite; got NaN or infinity")
-        departs = np.ascontiguousarray(np.broadcast_to(np.asarray(departure, np.float64), len(nodes)))
-        sources, rows, targets = (np.ascontiguousarray(a, np.int64) for a in (source, indptr, target))
+        departs = np.full(len(nodes), departure, np.float64)
+        sources, rows, targets = (np.require(a, np.int64, ["C", "W"]) for a in (source, indptr, target))
         fits = rows.size == sources.size + 1 and rows[0] == 0 and rows[-1] == targets.size
-        require(bool(fits and (np.diff(rows) >= 0).all()), "`indptr` must rise from 0 to the number of targets")
+        require(
+            bool(fits and (np.diff(rows) >= 0).all()), "`indptr` must rise from 0 to the number of targets"
+        )
         for name, index in (("source", sources), ("target", targets)):
-            inside = index.size == 0 or (0 <= index.min() and index.max() < len(nodes))
+            inside = index.size == 0 or (index.min() >= 0 and index.max() < len(nodes))
             require(inside, f"`{name}` must hold node numbers below {len(nodes)}; got others")
         steering, integration = self.steering.kernel(), self.integration.kernel()
         result: Array = edges.connect_all(
@@ -97,7 +111,7 @@ class Evaluator:
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
         """The outcome of one pair of points (3,) [m]."""
-        row = self.connect([start, goal], departure, [0], [0, 1], [1])[0]
+        row = self.connect(np.array([start, goal], np.float64), departure, [0], [0, 1], [1])[0]
         return Edge(int(row[0]), *(float(value) for value in row[1:]))
 
     def trace(self, start: ArrayLike, edge: Edge, departure: float) -> Array:
@@ -129,8 +143,11 @@ def count_statuses(outcomes: Array) -> dict[str, int]:
 @contextmanager
 def threads(count: int | None) -> Iterator[int]:
     """Run kernels on `count` threads (all cores if None); yields the number."""
-    most, before = numba.config.NUMBA_NUM_THREADS, numba.get_num_threads()
-    require(count is None or 1 <= count <= most, f"`threads` must be from 1 to {most} on this machine; got {count}")
+    most, before = _CONFIG.NUMBA_NUM_THREADS, numba.get_num_threads()
+    require(
+        count is None or 1 <= count <= most,
+        f"`threads` must be from 1 to {most} on this machine; got {count}",
+    )
     numba.set_num_threads(count or most)
     try:
         yield count or most

@@ -16,6 +16,8 @@ Range = tuple[float, float]
 Array = NDArray[np.float64]
 
 ALWAYS = (-math.inf, math.inf)
+BEYOND = 50.0
+"""How far [m] a path may pass the depths of the domain: the bound of the speed holds there too."""
 MAX_SAMPLES = 100_000_000
 """Largest grid [points] that `sampled` makes: 1.6 GB."""
 
@@ -126,6 +128,8 @@ def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices
     def rim(r: Array) -> Array:
         return np.asarray(speed[:, None, None] * r * np.exp(0.5 - 0.5 * r * r))
 
+    # a path may end a tolerance and a step beyond the depths of its nodes
+    depth = (depth[0] - BEYOND, depth[1] + BEYOND)
     edges = [
         np.linspace((vortex[a] - 3 * radius).min(), (vortex[a] + 3 * radius).max(), cells + 1) for a in "xy"
     ]
@@ -266,15 +270,19 @@ def is_steady(flow: kernel.Flow) -> bool:
     return math.isinf(flow.t_lo)
 
 
-def sample_flow(flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range) -> kernel.Grid:
+def sample_flow(
+    flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range
+) -> kernel.Grid:
     """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
     require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
     box = [(max(x[0], flow.x_lo), min(x[1], flow.x_hi)), (max(y[0], flow.y_lo), min(y[1], flow.y_hi)), z]
-    counts = [max(2, math.ceil((hi - lo) / step - 1e-9) + 1) for (lo, hi), step in zip(box, spacing, strict=True)]
+    points = [(hi - lo) / step + 1 for (lo, hi), step in zip(box, spacing, strict=True)]
     require(
-        math.prod(counts) <= MAX_SAMPLES,
-        f"`flow.sampled` = {list(spacing)} makes {math.prod(counts):,} points, more than {MAX_SAMPLES:,}; widen it",
+        math.prod(points) <= MAX_SAMPLES,
+        f"`flow.sampled` = {list(spacing)} makes {math.prod(points):.3g} points, "
+        f"more than {MAX_SAMPLES:,}; widen it",
     )
+    counts = [max(2, math.ceil(n - 1e-9)) for n in points]
     lines = [np.linspace(lo, hi, n) for (lo, hi), n in zip(box, counts, strict=True)]
     zz, xx, yy = (a.ravel() for a in np.meshgrid(lines[2], lines[0], lines[1], indexing="ij"))
     values = kernel.velocities(flow, xx, yy, zz, np.zeros(zz.size))
@@ -293,7 +301,9 @@ def sample_flow(flow: kernel.Flow, spacing: tuple[float, float, float], x: Range
         t_lo=flow.t_lo,
         t_hi=flow.t_hi,
         max_speed=float(np.hypot(values[..., 0], values[..., 1]).max()),
-        length_scale=max(flow.length_scale / 2, steps[0], steps[1]) if math.isfinite(flow.length_scale) else steps[0],
+        length_scale=max(flow.length_scale / 2, steps[0], steps[1])
+        if math.isfinite(flow.length_scale)
+        else steps[0],
     )
 
 
@@ -306,7 +316,9 @@ def flow_sha256(flow: kernel.Flow) -> str:
     return text.hexdigest()
 
 
-def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096) -> float:
+def divergence_ratio(
+    flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096
+) -> float:
     """Rms horizontal divergence over rms vorticity in a box [m]; the stream value needs it small.
 
     0 where the flow has neither; inf where it only diverges.

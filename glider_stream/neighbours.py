@@ -38,7 +38,10 @@ class Nearest:
     k: int | Literal["prm*"]
 
     def __post_init__(self) -> None:
-        require(self.k == "prm*" or int(self.k) >= 1, f'`neighbours.k` must be at least 1, or "prm*"; got {self.k}')
+        require(
+            self.k == "prm*" or int(self.k) >= 1,
+            f'`neighbours.k` must be at least 1, or "prm*"; got {self.k}',
+        )
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
         """As NeighbourLaw says."""
@@ -55,10 +58,10 @@ class _Nearest:
         asked = 2 * self.k + 1
         while True:
             asked = min(asked, self.tree.n)
-            distance, index = self.tree.query(point, k=np.arange(1, asked + 1))
+            distance, index = map(np.asarray, self.tree.query(point, k=np.arange(1, asked + 1)))
             other = self.tree.data[index, 2] != point[2]
-            if other.sum() >= self.k or asked == self.tree.n:
-                # equal distances are common on a grid: the lower index goes first
+            # equal distances are common on a grid, the lower index goes first: all of them must be there
+            if (distance[other] < distance[-1]).sum() >= self.k or asked == self.tree.n:
                 order = np.lexsort((index[other], distance[other]))[: self.k]
                 return np.sort(index[other][order])
             asked *= 2
@@ -91,8 +94,8 @@ class _Radius:
     radius: float
 
     def of(self, point: Array) -> Index:
-        index = np.sort(np.asarray(self.tree.query_ball_point(point, self.radius), np.int64))
-        return index[self.tree.data[index, 2] != point[2]]
+        index: Index = np.sort(np.asarray(self.tree.query_ball_point(point, self.radius), np.int64))
+        return np.asarray(index[self.tree.data[index, 2] != point[2]])
 
 
 @dataclass(frozen=True)

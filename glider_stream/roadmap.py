@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import Evaluator, Status, count_statuses, threads
+from .edges import Evaluator, count_statuses, threads
 from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.cache import KERNEL_DIGEST
+from .kernels.edges import Status
 from .neighbours import Neighbourhood, NeighbourLaw, as_csr
 from .sampling import Sampler
 from .settings import require
@@ -48,9 +49,14 @@ class Problem:
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""
-        said = "[" + ", ".join(f"{value:g}" for value in point) + "]"
+        shown = [*point]
+        if self.to_lonlat is not None and np.isfinite(point).all():
+            shown = [*self.to_lonlat(point[None])[0], -point[2]]
+        said = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
         require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
-        require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
+        require(
+            point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100"
+        )
         inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
         require(inside, f"`{name}` = {said} lies outside the flow or on land; move it into open water")
 
@@ -72,9 +78,8 @@ class Progress:
         rate = self.done / max(self.seconds, 1e-9)
         left = (self.total - self.done) / rate if self.done else math.inf
         share = self.connected / max(self.done, 1)
-        return (
-            f"{self.done:,} of {self.total:,} pairs, {rate:,.0f} pairs/s, {share:.1%} connected, {left:,.0f} s left"
-        )
+        so_far = f"{self.done:,} of {self.total:,} pairs, {rate:,.0f} pairs/s"
+        return f"{so_far}, {share:.1%} connected, {left:,.0f} s left"
 
 
 @dataclass(frozen=True)
@@ -198,7 +203,8 @@ def build_roadmap(
         began = time.perf_counter()
         first, looked = 0, 0
         while first < nodes:
-            rows, pairs = [], 0
+            rows: list[Index] = []
+            pairs = 0
             while first + len(rows) < nodes and pairs < batch_pairs:
                 rows.append(neighbourhood.of(position[first + len(rows)]))
                 pairs += len(rows[-1])

@@ -18,7 +18,10 @@ Allowed = Callable[[Array], NDArray[np.bool_]]
 class Sampler(Protocol):
     """A law of nodes: `nodes` places them, `seed` is 0 where there is none."""
 
-    seed: int
+    @property
+    def seed(self) -> int:
+        """The seed of its random numbers."""
+        ...
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
         """Points (n, 3) [m] in the box lo..hi (3,) [m]."""
@@ -95,7 +98,7 @@ class HaltonSampler(RandomSampler):
         return np.asarray(qmc.Halton(3, rng=np.random.default_rng(self.seed)).random(count))
 
 
-SAMPLERS: dict[str, type[Sampler]] = {
+SAMPLERS: dict[str, type[GridSampler | RandomSampler]] = {
     "grid": GridSampler,
     "uniform": RandomSampler,
     "sobol": SobolSampler,

@@ -7,7 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+import numba
+from numba import njit
+
+config: Any = numba.config  # its settings are made at run time
 
 
 def _digest() -> str:

@@ -179,9 +179,10 @@ def _on_line(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, 
     # the part of the glide range that is fast enough for the plane and for the depth
     shallow = angle_of_horizontal_speed(polar, direction, plane.lowest, polar.shallowest[direction])
     steep = angle_of_horizontal_speed(polar, direction, plane.lowest, polar.steepest[direction])
-    shallow = max(shallow, angle_of_vertical_speed(polar, direction, slowest))
-    if not shallow <= steep:
+    needed = angle_of_vertical_speed(polar, direction, slowest)
+    if not needed <= steep:
         return 0
+    shallow = max(shallow, needed)
     if plane.a == 0.0 and plane.b == 0.0:
         count = min(2, steering.candidates)
         controls[0] = (steep, math.atan2(plane.v, plane.u))
@@ -226,4 +227,4 @@ def candidate_controls(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q
 def _candidate_controls_in_kernels(
     steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
 ):
-    return _CANDIDATES.get(getattr(steering, "instance_class", None))
+    return _CANDIDATES.get(getattr(steering, "instance_class", type(None)))

@@ -90,7 +90,7 @@ def quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integr
 
 @njit
 def connect(flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q, z_q, t, controls):
-    """The cheapest leg from p, left at time t [s], to q among the candidate controls (scratch: `controls`)."""
+    """The cheapest leg from p, left at t [s], to q among the candidate controls (scratch: `controls`)."""
     direction = CLIMB if z_q > z_p else DIVE
     status = quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integration)
     if status != CONNECTED:
@@ -128,14 +128,34 @@ def connect_node(flow, terrain, polar, steering, integration, position, departur
     for n in range(targets.size):
         x_q, y_q, z_q = position[targets[n]]
         edge = connect(
-            flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q, z_q, departure[node], controls
+            flow,
+            terrain,
+            polar,
+            steering,
+            integration,
+            x_p,
+            y_p,
+            z_p,
+            x_q,
+            y_q,
+            z_q,
+            departure[node],
+            controls,
         )
         _store(edges, n, edge)
 
 
 @njit(inline="always")
 def _store(edges, n, edge):
-    edges[n] = (float(edge.status), edge.time, edge.cost, edge.glide_angle, edge.heading, edge.speed, edge.miss)
+    edges[n] = (
+        float(edge.status),
+        edge.time,
+        edge.cost,
+        edge.glide_angle,
+        edge.heading,
+        edge.speed,
+        edge.miss,
+    )
 
 
 @entry_point(parallel=True)
@@ -148,13 +168,24 @@ def connect_all(flow, terrain, polar, steering, integration, position, departure
     for n in prange(source.size):
         row = slice(indptr[n], indptr[n + 1])
         connect_node(
-            flow, terrain, polar, steering, integration, position, departure, source[n], target[row], edges[row]
+            flow,
+            terrain,
+            polar,
+            steering,
+            integration,
+            position,
+            departure,
+            source[n],
+            target[row],
+            edges[row],
         )
     return edges
 
 
 @njit
-def polish(flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, lanes):
+def polish(
+    flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, lanes
+):
     """The cheapest exact leg for each node among first guesses, between it and (x, y, z).
 
     Of a node's guesses those inside a cell go first, earliest first, then those outside, nearest first.
@@ -238,7 +269,9 @@ def polish(flow, terrain, polar, integration, position, direction, backward, x, 
 
 
 @njit
-def connect_by_fan(flow, terrain, polar, steering, bins, integration, position, wanted, backward, x, y, z, t, lanes):
+def connect_by_fan(
+    flow, terrain, polar, steering, bins, integration, position, wanted, backward, x, y, z, t, lanes
+):
     """The cheapest exact legs between (x, y, z) and the wanted nodes, both directions; rows as `polish`."""
     horizon = integration.dt * integration.steps
     lowest, highest = z, z
@@ -255,7 +288,20 @@ def connect_by_fan(flow, terrain, polar, steering, bins, integration, position, 
             integration.dt * FAN_STEP, horizon, lanes,
         )  # fmt: skip
         rows = polish(
-            flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, lanes
+            flow,
+            terrain,
+            polar,
+            integration,
+            position,
+            direction,
+            backward,
+            x,
+            y,
+            z,
+            t,
+            guesses,
+            count,
+            lanes,
         )
         found = np.concatenate((found, rows))
     return found
@@ -276,7 +322,17 @@ def connect_all_by_fan(
             q = target[k]
             direction = CLIMB if position[q, 2] > z else DIVE
             status = quick_status(
-                flow, polar, direction, x, y, z, position[q, 0], position[q, 1], position[q, 2], t, integration
+                flow,
+                polar,
+                direction,
+                x,
+                y,
+                z,
+                position[q, 0],
+                position[q, 1],
+                position[q, 2],
+                t,
+                integration,
             )
             _store(edges, k, no_edge(NO_HIT if status == CONNECTED else status))
             if status == CONNECTED:

@@ -46,7 +46,7 @@ class NodeBins(NamedTuple):
 
 
 class FlowMap(NamedTuple):
-    """Exact steering: a fan of `angles` x `headings` controls, its cells halved at most `generations` times."""
+    """Exact steering: a fan of `angles` x `headings` controls, cells halved `generations` times at most."""
 
     angles: int
     headings: int
@@ -100,7 +100,9 @@ def fan_rows(steering, polar, direction, z, levels, count, horizon, rows):
 
 
 @njit
-def land_on_levels(flow, polar, direction, x, y, z, t, levels, angle, heading, first, last, depth, dt, landing, lanes):
+def land_on_levels(
+    flow, polar, direction, x, y, z, t, levels, angle, heading, first, last, depth, dt, landing, lanes
+):
     """Fly controls first..last - 1 from (x, y, z) through `levels`; landings into `landing` (n, levels, 2).
 
     `depth[n]`: how many levels control n is flown through. Levels against the control's direction fly it back
@@ -186,8 +188,9 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
 def guess_in_cell(bins, slab, position, wanted, corners, before, angles, headings, guesses, count):
     """First guesses for the wanted nodes under one cell; returns (guesses, count).
 
-    `corners` (4, 2) and `before` (4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at the
-    slab's end and start. A row of `guesses`: node, angle, heading, how far outside, d(angle, heading)/d(x, y).
+    `corners` (4, 2) and `before` (4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at
+    the slab's end and start. A row of `guesses`: node, angle, heading, how far outside the cell, and
+    d(angle, heading) / d(x, y).
     """
     x_lo = min(corners[0, 0], corners[1, 0], corners[2, 0], corners[3, 0])
     x_hi = max(corners[0, 0], corners[1, 0], corners[2, 0], corners[3, 0])
@@ -293,7 +296,24 @@ def _wants_halving(bins, slab, position, wanted, corners, before, bend):
 
 
 @njit
-def fan_guesses(flow, polar, steering, bins, position, wanted, direction, backward, x, y, z, t, deepest, dt, horizon, lanes):
+def fan_guesses(
+    flow,
+    polar,
+    steering,
+    bins,
+    position,
+    wanted,
+    direction,
+    backward,
+    x,
+    y,
+    z,
+    t,
+    deepest,
+    dt,
+    horizon,
+    lanes,
+):
     """First guesses for the wanted nodes that a node at (x, y, z) may reach in one vertical direction.
 
     The wanted nodes lie no further than `deepest` [m]. With `backward`, those that may reach it, and the
@@ -328,7 +348,9 @@ def fan_guesses(flow, polar, steering, bins, position, wanted, direction, backwa
             angle[i * columns + j] = rows[i]
             heading[i * columns + j] = 2.0 * math.pi * j / columns
             depth[i * columns + j] = min(through + slack, reached)
-    land_on_levels(flow, polar, direction, x, y, z, t, levels, angle, heading, 0, vertices, depth, dt, landing, lanes)
+    land_on_levels(
+        flow, polar, direction, x, y, z, t, levels, angle, heading, 0, vertices, depth, dt, landing, lanes
+    )
 
     corners = np.empty((4, 2))
     before = np.empty((4, 2))
@@ -387,7 +409,22 @@ def fan_guesses(flow, polar, steering, bins, position, wanted, direction, backwa
                 depth[new + m] = through
             new += 5
         land_on_levels(
-            flow, polar, direction, x, y, z, t, levels, angle, heading, vertices, new, depth, dt, landing, lanes
+            flow,
+            polar,
+            direction,
+            x,
+            y,
+            z,
+            t,
+            levels,
+            angle,
+            heading,
+            vertices,
+            new,
+            depth,
+            dt,
+            landing,
+            lanes,
         )
         for c in range(first, last):
             mid = vertices + 5 * (c - first)
@@ -415,7 +452,16 @@ def fan_guesses(flow, polar, steering, bins, position, wanted, direction, backwa
                         bits_of[child] |= 1 << k
                     else:
                         guesses, count = guess_in_cell(
-                            bins, slabs[k], position, wanted, corners, before, angles, headings, guesses, count
+                            bins,
+                            slabs[k],
+                            position,
+                            wanted,
+                            corners,
+                            before,
+                            angles,
+                            headings,
+                            guesses,
+                            count,
                         )
             for child in range(4):
                 if bits_of[child]:
@@ -446,7 +492,8 @@ def _base_bend(landing, rows, row_count, columns, depth, i, j, k):
         for side in (j, (j + 1) % columns):
             bend = max(
                 bend,
-                0.25 * _bend(landing, here + (side - 1) % columns, here + (side + 1) % columns, here + side, k),
+                0.25
+                * _bend(landing, here + (side - 1) % columns, here + (side + 1) % columns, here + side, k),
             )
     for side in (j, (j + 1) % columns):
         for row in (i, i + 1):
@@ -459,10 +506,14 @@ def _base_bend(landing, rows, row_count, columns, depth, i, j, k):
                 step = rows[i + 1] - rows[i]
                 second = np.empty(2)
                 for m in range(2):
-                    second[m] = 2.0 * (
-                        (landing[up, k, m] - landing[here, k, m]) / high
-                        - (landing[here, k, m] - landing[down, k, m]) / low
-                    ) / (low + high)
+                    second[m] = (
+                        2.0
+                        * (
+                            (landing[up, k, m] - landing[here, k, m]) / high
+                            - (landing[here, k, m] - landing[down, k, m]) / low
+                        )
+                        / (low + high)
+                    )
                 bend = max(bend, math.hypot(second[0], second[1]) * step * step / 8.0)
     right = (j + 1) % columns
     a, b = i * columns + j, i * columns + right

@@ -171,7 +171,9 @@ def _vortices(flow, x, y, z, t):
         radius = flow.radius[n]
         dz = (-z - flow.depth[n]) / flow.thickness[n]
         # psi = s R sqrt(e) exp(-r^2 / 2R^2) exp(-dz^2);  u = d psi/dy, v = -d psi/dx
-        spin = flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
+        spin = (
+            flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
+        )
         u -= spin * dy
         v += spin * dx
     return u, v
@@ -304,12 +306,12 @@ def contains(flow: Flow, x: float, y: float, t: float) -> bool:
 
 @overload(velocity)
 def _velocity_in_kernels(flow, x, y, z, t):
-    return _VELOCITY.get(getattr(flow, "instance_class", None))
+    return _VELOCITY.get(getattr(flow, "instance_class", type(None)))
 
 
 @overload(contains)
 def _contains_in_kernels(flow, x, y, t):
-    return _CONTAINS.get(getattr(flow, "instance_class", None))
+    return _CONTAINS.get(getattr(flow, "instance_class", type(None)))
 
 
 @njit

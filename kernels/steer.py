@@ -47,7 +47,9 @@ def land_lanes(flow, polar, direction, origin, z_target, t, angle, heading, dt, 
 
 
 @njit
-def steer_lanes(flow, polar, direction, origin, target, t, angle, heading, inverse, dt, horizon, found, lanes):
+def steer_lanes(
+    flow, polar, direction, origin, target, t, angle, heading, inverse, dt, horizon, found, lanes
+):
     """Polish LANES guesses in place: `angle`, `heading` [rad], so that each lands on its target (3, LANES).
 
     `inverse` (4, LANES): d(angle, heading) / d(x, y) of the flow map near each guess, row by row.

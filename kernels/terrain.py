@@ -55,4 +55,4 @@ def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
 
 @overload(allowed)
 def _allowed_in_kernels(terrain, x, y, z):
-    return _ALLOWED.get(getattr(terrain, "instance_class", None))
+    return _ALLOWED.get(getattr(terrain, "instance_class", type(None)))
