@@ -26,9 +26,7 @@ def node_bins(position: NDArray[np.float64]) -> NodeBins:
     nx, ny = (int(span / size) + 1 for span in hi - lo)
     i, j = (np.minimum(((position[:, m] - lo[m]) / size).astype(np.int64), (nx, ny)[m] - 1) for m in range(2))
     where = (layer * nx + i) * ny + j
-    first = np.searchsorted(
-        where, np.arange(depths.size * nx * ny + 1), sorter=np.argsort(where, kind="stable")
-    )
+    first = np.searchsorted(where, np.arange(depths.size * nx * ny + 1), sorter=np.argsort(where, kind="stable"))
     return NodeBins(
         levels=depths,
         aligned=aligned,

@@ -137,9 +137,7 @@ class Description:
     def _frame(self) -> str:
         if self.frame_error > MAX_SCALE_ERROR:
             return "the whole extent is too wide for one flat frame: plan in a part of it"
-        told = (
-            f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
-        )
+        told = f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
         return told if self.map_error is None else f"{told}, by {self.map_error:.2g} m in place"
 
 

@@ -3,20 +3,24 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .bins import node_bins
+from .flow import is_steady
 from .kernels import control, edges, flow, motion, terrain
 from .kernels.edges import Edge, Status
+from .kernels.fan import FlowMap
 from .settings import require
 
 Array = NDArray[np.float64]
 _CONFIG: Any = numba.config  # its settings are made at run time
 MAX_CANDIDATES = 1_000_000
+MAX_FAN, MAX_GENERATIONS = 1000, 6
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,34 @@ class SurfaceMethod(StreamlineMethod):
         return control.Surface(self.candidates)
 
 
-METHODS: dict[str, type[StreamlineMethod]] = {"streamline": StreamlineMethod, "surface": SurfaceMethod}
+@dataclass(frozen=True)
+class FlowMapMethod:
+    """Exact steering: every connection that there is, by the flow map of each source node.
+
+    `fan` = [glide angles, headings] of the fan that a node sends out; its cells are halved up to
+    `generations` times where they are bent or folded, so that little depends on either.
+    """
+
+    fan: tuple[int, int] = (8, 16)
+    generations: int = 3
+
+    def __post_init__(self) -> None:
+        fits = 2 <= self.fan[0] <= MAX_FAN and 4 <= self.fan[1] <= MAX_FAN
+        require(fits, f"`steering.fan` must be from [2, 4] to [{MAX_FAN}, {MAX_FAN}]; got {list(self.fan)}")
+        fits = 0 <= self.generations <= MAX_GENERATIONS
+        require(fits, f"`steering.generations` must be from 0 to {MAX_GENERATIONS}; got {self.generations}")
+
+    def kernel(self) -> FlowMap:
+        """As the kernels read it."""
+        return FlowMap(*self.fan, self.generations)
+
+
+Method = StreamlineMethod | FlowMapMethod
+METHODS: dict[str, type[Method]] = {
+    "streamline": StreamlineMethod,
+    "surface": SurfaceMethod,
+    "flow-map": FlowMapMethod,
+}
 
 
 @dataclass(frozen=True)
@@ -71,7 +102,7 @@ class Evaluator:
     flow: flow.Flow
     terrain: terrain.Terrain
     polar: control.Polar
-    steering: StreamlineMethod
+    steering: Method
     integration: IntegrationSettings
 
     def connect(
@@ -90,24 +121,77 @@ class Evaluator:
         """
         # writeable arrays, always: Numba compiles read-only ones apart
         nodes = np.require(position, np.float64, ["C", "W"])
-        require(
-            nodes.ndim == 2 and nodes.shape[1] == 3, f"`position` must have shape (n, 3); got {nodes.shape}"
-        )
+        require(nodes.ndim == 2 and nodes.shape[1] == 3, f"`position` must have shape (n, 3); got {nodes.shape}")
         require(bool(np.isfinite(nodes).all()), "`position` must be finite; got NaN or infinity")
         departs = np.full(len(nodes), departure, np.float64)
         sources, rows, targets = (np.require(a, np.int64, ["C", "W"]) for a in (source, indptr, target))
         fits = rows.size == sources.size + 1 and rows[0] == 0 and rows[-1] == targets.size
-        require(
-            bool(fits and (np.diff(rows) >= 0).all()), "`indptr` must rise from 0 to the number of targets"
-        )
+        require(bool(fits and (np.diff(rows) >= 0).all()), "`indptr` must rise from 0 to the number of targets")
         for name, index in (("source", sources), ("target", targets)):
             inside = index.size == 0 or (index.min() >= 0 and index.max() < len(nodes))
             require(inside, f"`{name}` must hold node numbers below {len(nodes)}; got others")
-        steering, integration = self.steering.kernel(), self.integration.kernel()
-        result: Array = edges.connect_all(
-            self.flow, self.terrain, self.polar, steering, integration, nodes, departs, sources, rows, targets
-        )
+        medium = self.flow, self.terrain, self.polar, self.steering.kernel()
+        pairs = self.integration.kernel(), nodes, departs, sources, rows, targets
+        result: Array
+        if isinstance(self.steering, FlowMapMethod):
+            result = edges.connect_all_by_fan(*medium, node_bins(nodes), *pairs)
+        else:
+            result = edges.connect_all(*medium, *pairs)
         return result
+
+    @property
+    def flies_backward(self) -> bool:
+        """Whether one fan, flown back in time, finds all legs to a point."""
+        return isinstance(self.steering, FlowMapMethod) and is_steady(self.flow)
+
+    def by_fan(self) -> "Evaluator":
+        """The same, steering by the flow map."""
+        exact = isinstance(self.steering, FlowMapMethod)
+        return self if exact else replace(self, steering=FlowMapMethod())
+
+    def reach(
+        self, position: Array, departure: float, source: NDArray[np.int64], limit: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """The legs from each of the nodes `source` to whatever lies under its fan: (indptr, target, outcomes).
+
+        Only the fastest `limit` of each vertical direction, all where it is 0.
+        """
+        found = self._reach(position, np.zeros(3), departure, False, source, limit)
+        indptr = np.concatenate([[0], np.cumsum([len(rows) for rows in found])])
+        rows = np.concatenate([np.empty((0, 8)), *found])
+        return indptr.astype(np.int64), rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
+
+    def reach_point(
+        self, position: Array, point: Array, departure: float, backward: bool
+    ) -> tuple[NDArray[np.int64], Array]:
+        """The nodes that lie under the fan of a `point` (3,) [m], and the legs to them: (nodes, outcomes).
+
+        With `backward`, in a steady flow, those that reach it, and the legs from them.
+        """
+        if len(position) == 0:
+            return np.empty(0, np.int64), np.empty((0, 7))
+        (rows,) = self._reach(position, point, departure, backward, np.empty(0, np.int64), 0)
+        return rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
+
+    def _reach(
+        self,
+        position: Array,
+        point: Array,
+        departure: float,
+        backward: bool,
+        source: NDArray[np.int64],
+        limit: int,
+    ) -> list[Array]:
+        nodes = np.require(position, np.float64, ["C", "W"])
+        departs = np.full(len(nodes), departure)
+        medium = self.flow, self.terrain, self.polar, self.steering.kernel(), node_bins(nodes)
+        ends = nodes, departs, np.require(point, np.float64, ["C", "W"]), departure, backward, source, limit
+        room = 2 * limit if limit else min(len(nodes), 1024)
+        while True:
+            counts, found = edges.connect_reachable(*medium, self.integration.kernel(), *ends, room)
+            if counts.max() <= room:
+                return [rows[:count] for rows, count in zip(found, counts, strict=True)]
+            room = int(counts.max())
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
         """The outcome of one pair of points (3,) [m]."""

@@ -130,9 +130,7 @@ def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices
 
     # a path may end a tolerance and a step beyond the depths of its nodes
     depth = (depth[0] - BEYOND, depth[1] + BEYOND)
-    edges = [
-        np.linspace((vortex[a] - 3 * radius).min(), (vortex[a] + 3 * radius).max(), cells + 1) for a in "xy"
-    ]
+    edges = [np.linspace((vortex[a] - 3 * radius).min(), (vortex[a] + 3 * radius).max(), cells + 1) for a in "xy"]
     # distances from each centre, in radii: nearest and farthest point of each cell
     spans = []
     for axis, line in zip("xy", edges, strict=True):
@@ -316,9 +314,7 @@ def flow_sha256(flow: kernel.Flow) -> str:
     return text.hexdigest()
 
 
-def divergence_ratio(
-    flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096
-) -> float:
+def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096) -> float:
     """Rms horizontal divergence over rms vorticity in a box [m]; the stream value needs it small.
 
     0 where the flow has neither; inf where it only diverges.

@@ -115,7 +115,22 @@ class _All:
         return np.flatnonzero(self.position[:, 2] != point[2])
 
 
-NEIGHBOURS: dict[str, type[NeighbourLaw]] = {"nearest": Nearest, "radius": Radius, "all": AllNodes}
+@dataclass(frozen=True)
+class Reachable:
+    """The nodes that the flow map says a node can reach; the fastest `limit` down and as many up, 0 for all."""
+
+    limit: int = 0
+
+    def __post_init__(self) -> None:
+        require(self.limit >= 0, f"`neighbours.limit` must be at least 0, all; got {self.limit}")
+
+
+NEIGHBOURS: dict[str, type[NeighbourLaw | Reachable]] = {
+    "nearest": Nearest,
+    "radius": Radius,
+    "all": AllNodes,
+    "reachable": Reachable,
+}
 
 
 def as_csr(rows: Iterable[Index]) -> tuple[Index, Index]:

@@ -121,9 +121,7 @@ class OceanFlow:
     epoch: str | None = None
     names: Names | None = None
 
-    def waters(
-        self, frame: LocalFrame, lon: Range, lat: Range, depth: Range
-    ) -> tuple[OceanGrid, Seabed, str]:
+    def waters(self, frame: LocalFrame, lon: Range, lat: Range, depth: Range) -> tuple[OceanGrid, Seabed, str]:
         """Flow and seabed of a domain, and a word on where they come from."""
         file = read_currents(self.file, self.names, lon=lon, lat=lat, depth=depth)
         flow, seabed = ocean_flow(file, frame, lon, lat, depth, self.epoch, self.clearance)
@@ -199,9 +197,7 @@ def _opened(path: Path) -> Iterator[Any]:
         raise InputError(f"the current file {path} cannot be read: {error.strerror}") from None
     hdf5 = any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048))
     require(head[:4] != b"CDF\x05", f"{path.name} is a NetCDF-5 file: rewrite it with `nccopy -k nc4`")
-    require(
-        hdf5 or head[:4] in (b"CDF\x01", b"CDF\x02"), f"{path.name} is not a NetCDF file, whatever its name"
-    )
+    require(hdf5 or head[:4] in (b"CDF\x01", b"CDF\x02"), f"{path.name} is not a NetCDF file, whatever its name")
     with warnings.catch_warnings():
         # stale attributes of good data: several fill values, odd calendars
         warnings.simplefilter("ignore", xarray.SerializationWarning)
@@ -397,13 +393,9 @@ class _Reader:
     def _refuse_geometry(self, variable: Any) -> None:
         """Grids of other shapes, and what is no grid at all."""
         places = {
-            kind: name
-            for name in map(str, self.data.variables)
-            if (kind := self._kind(name)) in ("lon", "lat")
+            kind: name for name in map(str, self.data.variables) if (kind := self._kind(name)) in ("lon", "lat")
         }
-        of_two = [
-            n for n in map(str, self.data.variables) if self.data[n].ndim == 2 and self._kind(n) == "lon"
-        ]
+        of_two = [n for n in map(str, self.data.variables) if self.data[n].ndim == 2 and self._kind(n) == "lon"]
         curved = [name for name in of_two if set(self.data[name].dims) <= set(variable.dims)]
         if curved and not any(self.data[n].dims == (d,) for n in places.values() for d in variable.dims):
             raise InputError(
@@ -494,9 +486,7 @@ class _Reader:
                 # by its label: 1 March stays 1 March, whatever February was
                 values = np.array([np.datetime64(one.isoformat(), "us") for one in values])
             except ValueError:
-                raise InputError(
-                    f"{broken} has dates of the calendar {calendar!r} that do not exist"
-                ) from None
+                raise InputError(f"{broken} has dates of the calendar {calendar!r} that do not exist") from None
             notes = (f"times of the calendar {calendar!r} keep their dates",)
         times = (values.astype("datetime64[us]") + np.timedelta64(500, "us")).astype("datetime64[ms]")
         return times, notes
@@ -537,9 +527,7 @@ class _Reader:
         took |= {kind: coordinate for kind, (_, coordinate) in dims.items()}
         notes: tuple[str, ...] = ()
         if GRID_AXES.search(standard):
-            notes += (
-                f"`{name}` is {standard}: taken as {'east' if component == 'u' else 'north'}, as you say",
-            )
+            notes += (f"`{name}` is {standard}: taken as {'east' if component == 'u' else 'north'}, as you say",)
         notes += tuple(f"the dimension `{dim}` of one element is left out" for dim in single)
 
         lon, lon_turned = self._degrees(dims["lon"][1], "lon")
@@ -701,9 +689,7 @@ def _joined(paths: list[Path], parts: list[_Part]) -> OceanFile:
     require(_same(times, stacks["v"][0]), f"{name}: east and north currents are given at different times")
     if times is not None and times.size > 1:
         again = times[1:][np.diff(times) <= np.timedelta64(0, "ms")]
-        require(
-            again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap"
-        )
+        require(again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap")
     u, v = stacks["u"][1], stacks["v"][1]
     none = np.isnan(u) | np.isnan(v)
     fills = bool(none.any())
@@ -724,9 +710,7 @@ def _joined(paths: list[Path], parts: list[_Part]) -> OceanFile:
     merged = {key: what for part in reversed(parts) for key, what in part.took.items()}
     took = {key: merged[key] for key in ("u", "v", *WORDS) if key in merged}
     depth = np.zeros(1) if first.depth is None else first.depth
-    return OceanFile(
-        name, first.lon, first.lat, depth, times, u, v, wet, first.depth is None, took, tuple(notes)
-    )
+    return OceanFile(name, first.lon, first.lat, depth, times, u, v, wet, first.depth is None, took, tuple(notes))
 
 
 def _extent(axes: _Axes) -> str:
@@ -752,9 +736,7 @@ def _mark_land(u: NDArray[np.float32], v: NDArray[np.float32], fills: bool) -> l
     if land.any():
         notes.append(f"{int(land.sum())} columns with no current at any time or depth are taken as land")
     if (under := int((dry & ~land).sum())) > 0:
-        notes.append(
-            f"{under} points with no current at any time, down to the last level, are taken as seabed"
-        )
+        notes.append(f"{under} points with no current at any time, down to the last level, are taken as seabed")
     return notes
 
 

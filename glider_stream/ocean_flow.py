@@ -126,8 +126,7 @@ def crop(
     if axes[2] is not None:
         require(
             depth[1] <= axes[2][-1] + DEPTH_SLACK,
-            f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} "
-            f"is at {axes[2][-1]:g} m",
+            f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} is at {axes[2][-1]:g} m",
         )
         if axes[2].size > 1:
             span = _span(axes[2], depth, 0)
@@ -301,9 +300,7 @@ def _assemble(
         max_speed=float(np.sqrt((values**2).sum(axis=-1).max())) * (1 + 1e-12),
         length_scale=spacing,
     )
-    seabed = Seabed(
-        np.ascontiguousarray(bottom), clearance, at.index_map, at.per_x, at.per_y, at.x_lo, at.y_lo
-    )
+    seabed = Seabed(np.ascontiguousarray(bottom), clearance, at.index_map, at.per_x, at.per_y, at.x_lo, at.y_lo)
     return flow, seabed
 
 
@@ -320,8 +317,7 @@ def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice,
     assert epoch is not None
     require(
         bool(file.times[0] <= epoch <= file.times[-1]),
-        f"`epoch` = {epoch.astype('datetime64[s]')}Z lies outside the times of {file.name}, "
-        f"{file.time_range}",
+        f"`epoch` = {epoch.astype('datetime64[s]')}Z lies outside the times of {file.name}, {file.time_range}",
     )
     seconds = (file.times - epoch) / np.timedelta64(1, "s")
     first = min(int(np.searchsorted(seconds, 0, side="right")) - 1, seconds.size - 2)
@@ -355,9 +351,7 @@ def _build(
     wet = np.ones((file.depth.size, lons.size, lats.size), dtype=bool)
     for n in range(count):
         here = np.s_[during.start + n, :, rows, :]
-        east_north = [
-            part[here][..., which].transpose(0, 2, 1).astype(np.float64) for part in (file.u, file.v)
-        ]
+        east_north = [part[here][..., which].transpose(0, 2, 1).astype(np.float64) for part in (file.u, file.v)]
         wet &= np.isfinite(east_north[0])
         u, v = (part[levels] for part in east_north)
         turned = np.stack([u * cos - v * sin, u * sin + v * cos], axis=-1)
@@ -400,9 +394,7 @@ def ocean_flow(
         error <= MAX_SCALE_ERROR,
         f"the domain is too wide for a flat frame, whose metres would be {100 * error:.1f} % off; narrow it",
     )
-    require(
-        bool((seabed.bottom < 0).any()), f"the domain holds no water in {file.name}: every column is land"
-    )
+    require(bool((seabed.bottom < 0).any()), f"the domain holds no water in {file.name}: every column is land")
     return flow, seabed
 
 
@@ -420,9 +412,7 @@ def sample(
     when = None if time is None else parse_time(time, "a point's time")
     if not file.steady:
         assert file.times is not None
-        require(
-            when is not None, f"{file.name} holds several times, {file.time_range}: give each point its time"
-        )
+        require(when is not None, f"{file.name} holds several times, {file.time_range}: give each point its time")
         assert when is not None
         if not file.times[0] <= when <= file.times[-1]:
             return None
@@ -456,9 +446,7 @@ def _rising(axis: Any, what: str, even: bool) -> tuple[Array, int]:
     require(axis.ndim == 1 and bool(np.isfinite(axis).all()), f"`{what}` must be a line of numbers")
     turn = -1 if axis.size > 1 and axis[0] > axis[-1] else 1
     steps = np.diff(axis[::turn])
-    require(
-        bool((steps > 0).all()), f"`{what}` must rise or fall steadily; got {axis.size} values that do not"
-    )
+    require(bool((steps > 0).all()), f"`{what}` must rise or fall steadily; got {axis.size} values that do not")
     if even:
         require(axis.size > 1, f"`{what}` must hold at least two values; got {axis.size}")
         require(float(np.ptp(steps)) <= EVEN * float(steps.mean()), f"`{what}` must be evenly spaced")
@@ -491,9 +479,7 @@ def grid_flow(
     for name, part in (("u", u), ("v", v)):
         part = np.asarray(part, dtype=np.float64)
         part = part[None] if part.ndim == 3 else part
-        require(
-            part.shape == shape, f"`{name}` must have the shape (times, z, y, x) = {shape}; got {part.shape}"
-        )
+        require(part.shape == shape, f"`{name}` must have the shape (times, z, y, x) = {shape}; got {part.shape}")
         parts.append(part)
     values = np.stack(parts, axis=-1)
     require(not np.isinf(values).any(), "`u` and `v` must be finite, or NaN where there is no water; got inf")
@@ -511,9 +497,7 @@ def grid_flow(
     wet = np.isfinite(values[..., 0]).all(axis=0)
     require(bool(wet[0].any()), "the grid holds no water: `u` and `v` are NaN or masked in every column")
     faces = np.array([np.inf]) if z.size == 1 else lower_faces(-z[::-1])
-    corner = np.array(
-        [[[0, 0], [0, y.size - 1]], [[x.size - 1, 0], [x.size - 1, y.size - 1]]], dtype=np.float64
-    )
+    corner = np.array([[[0, 0], [0, y.size - 1]], [[x.size - 1, 0], [x.size - 1, y.size - 1]]], dtype=np.float64)
     width, height = float(x[-1] - x[0]), float(y[-1] - y[0])
     box = (float(x[0]), float(x[-1]), float(y[0]), float(y[-1]))
     at = IndexMap(corner, 1 / width, 1 / height, *box, error=0.0)

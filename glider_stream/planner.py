@@ -28,9 +28,7 @@ def build(
     if output is not None:
         check_output(output)
     if isinstance(scenario, Scenario):
-        require(
-            not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}"
-        )
+        require(not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}")
         resolved = scenario
     else:
         itself = output is not None and File(output).resolve() == File(scenario).resolve()

@@ -16,7 +16,7 @@ from .errors import InputError
 from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.edges import Edge, Status
-from .neighbours import Neighbourhood
+from .legs import Attached, Legs
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
 from .settings import require
 
@@ -133,14 +133,6 @@ def load_path(file: str | File) -> Path:
     return Path(legs[0].start, legs[-1].end, cost, legs)
 
 
-@dataclass(frozen=True)
-class _Attached:
-    """Edges between one point and the nodes of a roadmap: node numbers (n,), rows of `Edge` (n, 7)."""
-
-    nodes: Index
-    outcomes: Array
-
-
 class Planner:
     """Answers queries from one roadmap; any number, the roadmap is left as it is."""
 
@@ -169,8 +161,8 @@ class Planner:
         last, goal_at = self._end(goal, self.problem.goal, "goal")
         if np.array_equal(start_at, goal_at):
             return Path(start_at, goal_at, 0.0, ())
-        away = None if first.size else self._attach(start_at, departing=True)
-        towards = None if last.size else self._attach(goal_at, departing=False)
+        away = None if first.size else _connected(self._legs.away(start_at))
+        towards = None if last.size else _connected(self._legs.towards(goal_at))
         origin = int(first[0]) if first.size else len(self.roadmap.position)
         distance, before = self._search(origin, away)
         ends = last if towards is None else towards.nodes
@@ -195,8 +187,8 @@ class Planner:
         return self._path(start_at, goal_at, cost, hops[::-1])
 
     @cached_property
-    def _neighbourhood(self) -> Neighbourhood:
-        return self.problem.neighbourhood(self.roadmap.position)
+    def _legs(self) -> Legs:
+        return self.problem.legs(self.roadmap.position)
 
     def _end(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
         """The nodes that lie at an end of the query, often none, and where it is."""
@@ -208,19 +200,7 @@ class Planner:
         self.problem.check_point(place, name)
         return np.flatnonzero((self.roadmap.position == place).all(axis=1)), place
 
-    def _attach(self, point: Array, departing: bool) -> _Attached:
-        nodes = self._neighbourhood.of(point)
-        position = np.vstack([self.roadmap.position[nodes], point])
-        here, others = len(nodes), np.arange(len(nodes))
-        if departing:
-            source, indptr, target = np.array([here]), np.array([0, here]), others
-        else:
-            source, indptr, target = others, np.arange(here + 1), np.full(here, here)
-        outcomes = self.problem.evaluator.connect(position, self.problem.departure, source, indptr, target)
-        connected = outcomes[:, 0] == Status.CONNECTED
-        return _Attached(nodes[connected], outcomes[connected])
-
-    def _search(self, origin: int, away: _Attached | None) -> tuple[Array, NDArray[np.int32]]:
+    def _search(self, origin: int, away: Attached | None) -> tuple[Array, NDArray[np.int32]]:
         """Cost from `origin` to every node, and each one's predecessor; an attached start is one more."""
         road, nodes = self.roadmap, len(self.roadmap.position)
         cost, target, indptr = road.cost, road.target, road.indptr
@@ -237,7 +217,7 @@ class Planner:
     def _where(self, node: int, start: Array) -> Array:
         return start if node == len(self.roadmap.position) else self.roadmap.position[node]
 
-    def _edge(self, source: int, target: int, away: _Attached | None) -> Edge:
+    def _edge(self, source: int, target: int, away: Attached | None) -> Edge:
         if source == len(self.roadmap.position):
             assert away is not None
             return _edge(away.outcomes[np.flatnonzero(away.nodes == target)[0]])
@@ -254,6 +234,11 @@ class Planner:
             legs.append(Leg(source, target, *control, clock, edge.time, edge.miss, rows))
             clock += edge.time
         return Path(start, goal, cost, tuple(legs))
+
+
+def _connected(attached: Attached) -> Attached:
+    kept = attached.outcomes[:, 0] == Status.CONNECTED
+    return Attached(attached.nodes[kept], attached.outcomes[kept])
 
 
 def _edge(row: Array) -> Edge:

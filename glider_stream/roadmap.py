@@ -16,7 +16,8 @@ from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.cache import KERNEL_DIGEST
 from .kernels.edges import Status
-from .neighbours import Neighbourhood, NeighbourLaw, as_csr
+from .legs import Legs, legs_of
+from .neighbours import NeighbourLaw, Reachable
 from .sampling import Sampler
 from .settings import require
 
@@ -36,7 +37,7 @@ class Problem:
 
     evaluator: Evaluator
     sampler: Sampler
-    law: NeighbourLaw
+    law: NeighbourLaw | Reachable
     lo: Array
     hi: Array
     departure: float
@@ -54,15 +55,14 @@ class Problem:
             shown = [*self.to_lonlat(point[None])[0], -point[2]]
         said = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
         require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
-        require(
-            point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100"
-        )
+        require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
         inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
         require(inside, f"`{name}` = {said} lies outside the flow or on land; move it into open water")
 
-    def neighbourhood(self, position: Array) -> Neighbourhood:
-        """The neighbour law, ready for these nodes."""
-        return self.law.among(position, float(np.prod(self.hi - self.lo)))
+    def legs(self, position: Array) -> Legs:
+        """How legs among these nodes (n, 3) [m] are found."""
+        volume = float(np.prod(self.hi - self.lo))
+        return legs_of(self.law, self.evaluator, position, volume, self.departure)
 
 
 @dataclass(frozen=True)
@@ -176,9 +176,9 @@ def node_positions(problem: Problem) -> Array:
     return position
 
 
-def warm_up(evaluator: Evaluator) -> None:
-    """Compile the kernels that `evaluator` needs, or load them from the disk cache."""
-    evaluator.connect(np.zeros((2, 3)), 0.0, [0], [0, 1], [1])
+def warm_up(problem: Problem) -> None:
+    """Compile the kernels that a build needs, or load them from the disk cache."""
+    problem.legs(problem.lo[None]).of(0, 1)
 
 
 def build_roadmap(
@@ -193,30 +193,24 @@ def build_roadmap(
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     position = node_positions(problem)
-    neighbourhood = problem.neighbourhood(position)
+    legs = problem.legs(position)
     nodes = len(position)
     degree = np.zeros(nodes, np.int64)
     found: list[tuple[Index, Array]] = []
     counts = dict.fromkeys((status.name.lower() for status in Status), 0)
     with threads(thread_count) as used:
-        warm_up(problem.evaluator)
+        warm_up(problem)
         began = time.perf_counter()
         first, looked = 0, 0
         while first < nodes:
-            rows: list[Index] = []
-            pairs = 0
-            while first + len(rows) < nodes and pairs < batch_pairs:
-                rows.append(neighbourhood.of(position[first + len(rows)]))
-                pairs += len(rows[-1])
-            indptr, target = as_csr(rows)
-            source = np.arange(first, first + len(rows))
-            outcomes = problem.evaluator.connect(position, problem.departure, source, indptr, target)
-            connected = outcomes[:, 0] == Status.CONNECTED
-            np.add.at(degree, np.repeat(source, np.diff(indptr))[connected], 1)
-            found.append((target[connected], outcomes[connected, 1:]))
-            for name, count in count_statuses(outcomes).items():
+            batch = legs.of(first, batch_pairs)
+            connected = batch.outcomes[:, 0] == Status.CONNECTED
+            source = np.arange(first, first + len(batch.indptr) - 1)
+            np.add.at(degree, np.repeat(source, np.diff(batch.indptr))[connected], 1)
+            found.append((batch.target[connected], batch.outcomes[connected, 1:]))
+            for name, count in count_statuses(batch.outcomes).items():
                 counts[name] += count
-            first, looked = first + len(rows), looked + pairs
+            first, looked = first + source.size, looked + batch.target.size
             total = looked + round(looked / first * (nodes - first))
             progress(Progress(looked, total, counts["connected"], time.perf_counter() - began))
         wall = time.perf_counter() - began

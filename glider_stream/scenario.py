@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from .domain import BoxDomain, GeographicDomain, Point, domain_from_table
-from .edges import METHODS, Evaluator, IntegrationSettings, StreamlineMethod
+from .edges import METHODS, Evaluator, IntegrationSettings, Method
 from .errors import InputError
 from .flow import FLOWS, AnalyticFlow, divergence_ratio, is_steady, sample_flow
 from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Terrain
-from .neighbours import NEIGHBOURS, NeighbourLaw
+from .neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .ocean import OceanFlow
 from .roadmap import Problem
 from .sampling import SAMPLERS, Sampler
@@ -59,8 +59,8 @@ class Scenario:
     flow: AnalyticFlow | OceanFlow
     glider: Glider
     sampler: Sampler
-    law: NeighbourLaw
-    method: StreamlineMethod
+    law: NeighbourLaw | Reachable
+    method: Method
     integration: IntegrationSettings
     cost: TravelTime
     query: QueryPoints | None

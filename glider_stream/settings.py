@@ -85,9 +85,7 @@ def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
     return kind(**{key: _fits(value, hints[key], f"{where}.{key}") for key, value in table.items()})
 
 
-def from_kinds(
-    kinds: Mapping[str, type[T]], table: Mapping[str, Any], where: str, selector: str = "kind"
-) -> T:
+def from_kinds(kinds: Mapping[str, type[T]], table: Mapping[str, Any], where: str, selector: str = "kind") -> T:
     """As `from_table`, the class chosen by the key `selector`."""
     rest = dict(table)
     if selector not in rest:

@@ -20,7 +20,7 @@ from .control import (
 from .cost import edge_cost
 from .fan import fan_guesses
 from .flow import contains
-from .motion import LANES, arrival_window, closest_approach, is_clear
+from .motion import LANE_ROWS, LANES, arrival_window, closest_approach, is_clear
 from .steer import steer_lanes
 
 
@@ -184,12 +184,12 @@ def connect_all(flow, terrain, polar, steering, integration, position, departure
 
 @njit
 def polish(
-    flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, lanes
+    flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, limit, lanes
 ):
     """The cheapest exact leg for each node among first guesses, between it and (x, y, z).
 
     Of a node's guesses those inside a cell go first, earliest first, then those outside, nearest first.
-    Returns rows (nodes, 1 + fields of Edge), the node first.
+    `limit` > 0: only the fastest so many legs. Returns rows (nodes, 1 + fields of Edge), the node first.
     """
     horizon = integration.dt * integration.steps
     time = np.empty(count)
@@ -206,18 +206,53 @@ def polish(
             begin[groups] = n
             groups += 1
     begin[groups] = count
-    cursor = begin[:groups].copy()
     result = np.empty((groups, 8))
+    earliest = np.empty(groups)
     for g in range(groups):
         result[g, 0] = guesses[order[begin[g]], 0]
         _store(result[:, 1:], g, no_edge(NO_HIT))
+        earliest[g] = time[order[begin[g]]]
+    if limit == 0:
+        polish_groups(
+            flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, time, order,
+            begin, np.arange(groups), result, lanes,
+        )  # fmt: skip
+        return result
+    # the earliest first, until `limit` legs are found that none of the rest can beat
+    queue = np.argsort(earliest, kind="mergesort")
+    done = 0
+    while done < groups:
+        block = queue[done : done + limit]
+        polish_groups(
+            flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, time, order,
+            begin, block.copy(), result, lanes,
+        )  # fmt: skip
+        done += block.size
+        costs = np.sort(result[queue[:done], 3])
+        found = np.sum(result[queue[:done], 1] == CONNECTED)
+        if found >= limit and done < groups and costs[limit - 1] <= edge_cost(earliest[queue[done]]):
+            break
+    looked = np.sort(queue[:done])
+    kept = result[looked]
+    # NaN, the cost of what is not connected, sorts last
+    by_cost = np.argsort(kept[:, 3], kind="mergesort")
+    return kept[np.sort(by_cost[:limit])] if by_cost.size > limit else kept
+
+
+@njit
+def polish_groups(
+    flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, time, order, begin,
+    pending, result, lanes,
+):  # fmt: skip
+    """Polish the guesses of the groups `pending` (its order is lost), LANES at a time, into rows of `result`."""
+    horizon = integration.dt * integration.steps
+    cursor = begin[:-1].copy()
     origin = np.empty((3, LANES))
     target = np.empty((3, LANES))
     angle = np.empty(LANES)
     heading = np.empty(LANES)
     inverse = np.empty((4, LANES))
     found = np.empty((2, LANES))
-    pending = np.arange(groups)
     while pending.size > 0:
         for first in range(0, pending.size, LANES):
             used = min(LANES, pending.size - first)
@@ -265,14 +300,16 @@ def polish(
             pending[left] = g
             left += 1
         pending = pending[:left]
-    return result
 
 
 @njit
 def connect_by_fan(
-    flow, terrain, polar, steering, bins, integration, position, wanted, backward, x, y, z, t, lanes
+    flow, terrain, polar, steering, bins, integration, position, wanted, backward, x, y, z, t, limit, lanes
 ):
-    """The cheapest exact legs between (x, y, z) and the wanted nodes, both directions; rows as `polish`."""
+    """The cheapest exact legs between (x, y, z) and the wanted nodes, in both directions.
+
+    Rows as `polish` has them; `limit` holds for each direction.
+    """
     horizon = integration.dt * integration.steps
     lowest, highest = z, z
     for n in range(position.shape[0]):
@@ -288,23 +325,19 @@ def connect_by_fan(
             integration.dt * FAN_STEP, horizon, lanes,
         )  # fmt: skip
         rows = polish(
-            flow,
-            terrain,
-            polar,
-            integration,
-            position,
-            direction,
-            backward,
-            x,
-            y,
-            z,
-            t,
-            guesses,
-            count,
+            flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, limit,
             lanes,
-        )
+        )  # fmt: skip
         found = np.concatenate((found, rows))
     return found
+
+
+@njit
+def _wanted_all(position, z):
+    wanted = np.zeros(position.shape[0], np.int64)
+    for n in range(position.shape[0]):
+        wanted[n] = position[n, 2] != z
+    return wanted
 
 
 @entry_point(parallel=True)
@@ -337,10 +370,43 @@ def connect_all_by_fan(
             _store(edges, k, no_edge(NO_HIT if status == CONNECTED else status))
             if status == CONNECTED:
                 wanted[q] = k + 1
-        lanes = np.empty((22, LANES))
         rows = connect_by_fan(
-            flow, terrain, polar, steering, bins, integration, position, wanted, False, x, y, z, t, lanes
-        )
+            flow, terrain, polar, steering, bins, integration, position, wanted, False, x, y, z, t, 0,
+            np.zeros((LANE_ROWS, LANES)),
+        )  # fmt: skip
         for r in range(rows.shape[0]):
             edges[wanted[int(rows[r, 0])] - 1] = rows[r, 1:]
     return edges
+
+
+@entry_point(parallel=True)
+def connect_reachable(
+    flow, terrain, polar, steering, bins, integration, position, departure, point, t, backward, source, limit,
+    capacity,
+):  # fmt: skip
+    """The legs from each of the nodes `source` (n,) to every node that lies under its fan, rows as `polish`.
+
+    Where `source` is empty: the legs from `point` (3,) [m] at time t [s], or with `backward` those to it.
+    Returns counts (n,) and rows (n, capacity, 8); a count above `capacity` says how much room is needed.
+    """
+    here = source.size == 0
+    nodes = 1 if here else source.size
+    counts = np.zeros(nodes, np.int64)
+    found = np.empty((nodes, capacity, 8))
+    for n in prange(nodes):
+        if here:
+            x, y, z = point
+            when = t
+        else:
+            x, y, z = position[source[n]]
+            when = departure[source[n]]
+        if contains(flow, x, y, when):
+            rows = connect_by_fan(
+                flow, terrain, polar, steering, bins, integration, position, _wanted_all(position, z), backward,
+                x, y, z, when, limit, np.zeros((LANE_ROWS, LANES)),
+            )  # fmt: skip
+            counts[n] = rows.shape[0]
+            rows = rows[np.argsort(rows[:, 0])]
+            for r in range(min(rows.shape[0], capacity)):
+                found[n, r] = rows[r]
+    return counts, found

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .control import angle_of_vertical_speed, glide_speed, vertical_speed
 from .flow import Array
-from .motion import LANES, rk4_lanes
+from .motion import LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
 
 Index = NDArray[np.int64]
 
@@ -108,20 +108,16 @@ def land_on_levels(
     `depth[n]`: how many levels control n is flown through. Levels against the control's direction fly it back
     in time, to where it would have left to land at (x, y, z): in a steady flow the flow map's inverse.
     """
-    xs, ys, zs, clock, u, v, w, h = (
-        lanes[0], lanes[1], lanes[2], lanes[3], lanes[4], lanes[5], lanes[6], lanes[7]
-    )  # fmt: skip
-    work = lanes[10:18]
     for begin in range(first, last, LANES):
         through = 0
         for n in range(LANES):
             one = min(begin + n, last - 1)
             speed = glide_speed(polar, direction, angle[one])
             along = speed * math.cos(angle[one])
-            u[n] = along * math.cos(heading[one])
-            v[n] = along * math.sin(heading[one])
-            w[n] = (2.0 * direction - 1.0) * speed * math.sin(angle[one])
-            xs[n], ys[n], zs[n], clock[n] = x, y, z, t
+            lanes[U, n] = along * math.cos(heading[one])
+            lanes[V, n] = along * math.sin(heading[one])
+            lanes[W, n] = (2.0 * direction - 1.0) * speed * math.sin(angle[one])
+            lanes[X, n], lanes[Y, n], lanes[Z, n], lanes[T, n] = x, y, z, t
             through = max(through, depth[one])
         height = z
         for level in range(through):
@@ -130,18 +126,18 @@ def land_on_levels(
             for n in range(LANES):
                 one = min(begin + n, last - 1)
                 # a lane beyond its own depth stands still
-                h[n] = rise / w[n] if level < depth[one] else 0.0
-                steps = max(steps, math.ceil(abs(h[n]) / dt))
+                lanes[H, n] = rise / lanes[W, n] if level < depth[one] else 0.0
+                steps = max(steps, math.ceil(abs(lanes[H, n]) / dt))
             for n in range(LANES):
-                h[n] /= steps
+                lanes[H, n] /= steps
             for _ in range(steps):
-                rk4_lanes(flow, xs, ys, zs, clock, u, v, w, h, work)
+                rk4_lanes(flow, lanes)
             height = levels[level]
             for n in range(LANES):
-                zs[n] = height
+                lanes[Z, n] = height
                 if begin + n < last and level < depth[begin + n]:
-                    landing[begin + n, level, 0] = xs[n]
-                    landing[begin + n, level, 1] = ys[n]
+                    landing[begin + n, level, 0] = lanes[X, n]
+                    landing[begin + n, level, 1] = lanes[Y, n]
 
 
 class Slab(NamedTuple):
@@ -185,13 +181,14 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
 
 
 @njit
-def guess_in_cell(bins, slab, position, wanted, corners, before, angles, headings, guesses, count):
+def guess_in_cell(bins, slab, position, wanted, image, angles, headings, guesses, count):
     """First guesses for the wanted nodes under one cell; returns (guesses, count).
 
-    `corners` (4, 2) and `before` (4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at
-    the slab's end and start. A row of `guesses`: node, angle, heading, how far outside the cell, and
+    `image` (3, 4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at the slab's end and at
+    its start; the third is scratch. A row of `guesses`: node, angle, heading, how far outside the cell, and
     d(angle, heading) / d(x, y).
     """
+    corners, before, at = image[0], image[1], image[2]
     x_lo = min(corners[0, 0], corners[1, 0], corners[2, 0], corners[3, 0])
     x_hi = max(corners[0, 0], corners[1, 0], corners[2, 0], corners[3, 0])
     y_lo = min(corners[0, 1], corners[1, 1], corners[2, 1], corners[3, 1])
@@ -206,7 +203,6 @@ def guess_in_cell(bins, slab, position, wanted, corners, before, angles, heading
     j_first, j_last = _bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
     da = angles[1] - angles[0]
     dh = headings[1] - headings[0]
-    at = np.empty((4, 2))
     for i in range(i_first, i_last + 1):
         row = (slab.layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
@@ -352,8 +348,8 @@ def fan_guesses(
         flow, polar, direction, x, y, z, t, levels, angle, heading, 0, vertices, depth, dt, landing, lanes
     )
 
-    corners = np.empty((4, 2))
-    before = np.empty((4, 2))
+    image = np.empty((3, 4, 2))
+    corners, before = image[0], image[1]
     cell = np.empty(4, np.int64)
     angles = np.empty(2)
     headings = np.empty(2)
@@ -383,7 +379,7 @@ def fan_guesses(
                     bits |= 1 << k
                 else:
                     guesses, count = guess_in_cell(
-                        bins, slabs[k], position, wanted, corners, before, angles, headings, guesses, count
+                        bins, slabs[k], position, wanted, image, angles, headings, guesses, count
                     )
             if bits:
                 queue, span, todo, waiting = _push(queue, span, todo, waiting, cell, angles, headings, bits)
@@ -456,8 +452,7 @@ def fan_guesses(
                             slabs[k],
                             position,
                             wanted,
-                            corners,
-                            before,
+                            image,
                             angles,
                             headings,
                             guesses,
@@ -492,8 +487,7 @@ def _base_bend(landing, rows, row_count, columns, depth, i, j, k):
         for side in (j, (j + 1) % columns):
             bend = max(
                 bend,
-                0.25
-                * _bend(landing, here + (side - 1) % columns, here + (side + 1) % columns, here + side, k),
+                0.25 * _bend(landing, here + (side - 1) % columns, here + (side + 1) % columns, here + side, k),
             )
     for side in (j, (j + 1) % columns):
         for row in (i, i + 1):

@@ -171,9 +171,7 @@ def _vortices(flow, x, y, z, t):
         radius = flow.radius[n]
         dz = (-z - flow.depth[n]) / flow.thickness[n]
         # psi = s R sqrt(e) exp(-r^2 / 2R^2) exp(-dz^2);  u = d psi/dy, v = -d psi/dx
-        spin = (
-            flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
-        )
+        spin = flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
         u -= spin * dy
         v += spin * dx
     return u, v

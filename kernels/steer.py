@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from .control import glide_speed
-from .motion import LANES, rk4_lanes
+from .motion import LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
 
 LANDING_TOLERANCE = 0.005
 """A landing this close to its target [m] is a hit: half of what an edge may miss by."""
@@ -17,46 +17,45 @@ MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
 
+TIME, MISS_X, MISS_Y, TURN_A, TURN_H, FIRST_MISS = range(16, 22)
+"""Rows of a lanes array beyond `motion`'s own."""
+
+
 @njit
 def land_lanes(flow, polar, direction, origin, z_target, t, angle, heading, dt, lanes):
-    """Where LANES controls land at their target depths: into lanes[0], lanes[1]; times into lanes[9] [s].
+    """Where LANES controls land at their target depths: into rows X, Y of `lanes`; row TIME: how long [s].
 
     `origin` (3, LANES) [m], all left at time t [s]. Steps of `dt` and a last, shorter one, as `motion.trace`.
     """
-    x, y, z, clock, u, v, w, h, time = (
-        lanes[0], lanes[1], lanes[2], lanes[3], lanes[4], lanes[5], lanes[6], lanes[7], lanes[9]
-    )  # fmt: skip
-    work = lanes[10:18]
     sign = 2.0 * direction - 1.0
     longest = 0.0
     for n in range(LANES):
         speed = glide_speed(polar, direction, angle[n])
         along = speed * math.cos(angle[n])
-        u[n] = along * math.cos(heading[n])
-        v[n] = along * math.sin(heading[n])
-        w[n] = speed * math.sin(sign * angle[n])
-        x[n], y[n], z[n] = origin[0, n], origin[1, n], origin[2, n]
-        time[n] = (z_target[n] - z[n]) / w[n]
-        longest = max(longest, time[n])
-    for step in range(int(longest / dt) + 1):
+        lanes[U, n] = along * math.cos(heading[n])
+        lanes[V, n] = along * math.sin(heading[n])
+        lanes[W, n] = speed * math.sin(sign * angle[n])
+        lanes[X, n], lanes[Y, n] = origin[0, n], origin[1, n]
+        lanes[TIME, n] = (z_target[n] - origin[2, n]) / lanes[W, n]
+        longest = max(longest, lanes[TIME, n])
+    for step in range(math.ceil(longest / dt)):
         for n in range(LANES):
-            clock[n] = t + step * dt
-            z[n] = origin[2, n] + step * dt * w[n]
-            h[n] = min(dt, max(0.0, time[n] - step * dt))
-        rk4_lanes(flow, x, y, z, clock, u, v, w, h, work)
+            lanes[T, n] = t + step * dt
+            lanes[Z, n] = origin[2, n] + step * dt * lanes[W, n]
+            lanes[H, n] = min(dt, max(0.0, lanes[TIME, n] - step * dt))
+        rk4_lanes(flow, lanes)
 
 
 @njit
-def steer_lanes(
-    flow, polar, direction, origin, target, t, angle, heading, inverse, dt, horizon, found, lanes
-):
+def steer_lanes(flow, polar, direction, origin, target, t, angle, heading, inverse, dt, horizon, found, lanes):
     """Polish LANES guesses in place: `angle`, `heading` [rad], so that each lands on its target (3, LANES).
 
     `inverse` (4, LANES): d(angle, heading) / d(x, y) of the flow map near each guess, row by row.
-    `found` (3, LANES): miss [m], inf where the steps did not close in or the horizon [s] is passed; time [s].
+    `found` (2, LANES): miss [m], inf where the steps did not close in or the horizon [s] is passed; time [s].
     """
     low, high = polar.shallowest[direction], polar.steepest[direction]
-    miss_x, miss_y, da, dh, first_miss = lanes[18], lanes[19], lanes[20], lanes[21], lanes[8]
+    time, first_miss = lanes[TIME], lanes[FIRST_MISS]
+    miss_x, miss_y, da, dh = lanes[MISS_X], lanes[MISS_Y], lanes[TURN_A], lanes[TURN_H]
     open_lanes = np.ones(LANES, np.bool_)
     for n in range(LANES):
         found[0, n] = math.inf
@@ -66,14 +65,14 @@ def steer_lanes(
         for n in range(LANES):
             if not open_lanes[n]:
                 continue
-            rx = lanes[0, n] - target[0, n]
-            ry = lanes[1, n] - target[1, n]
+            rx = lanes[X, n] - target[0, n]
+            ry = lanes[Y, n] - target[1, n]
             miss = math.hypot(rx, ry)
             if miss <= LANDING_TOLERANCE or not miss < math.inf:
                 open_lanes[n] = False
-                if miss <= LANDING_TOLERANCE and lanes[9, n] <= horizon:
+                if miss <= LANDING_TOLERANCE and time[n] <= horizon:
                     found[0, n] = miss
-                    found[1, n] = lanes[9, n]
+                    found[1, n] = time[n]
                 continue
             if iteration == GIVE_UP and miss > 0.25 * first_miss[n]:
                 open_lanes[n] = False

@@ -49,9 +49,9 @@ def sampled(vortices):
 @pytest.fixture(scope="session")
 def gyre():
     """A double gyre that swings as fast as a glider crosses it."""
-    return DoubleGyre(
-        amplitude=0.2, length=450.0, epsilon=0.25, period=700.0, origin=(-450.0, -225.0)
-    ).kernel(HEIGHTS)
+    return DoubleGyre(amplitude=0.2, length=450.0, epsilon=0.25, period=700.0, origin=(-450.0, -225.0)).kernel(
+        HEIGHTS
+    )
 
 
 def _slots(points):

@@ -133,7 +133,11 @@ SCENARIOS = {
         "`domain.z` must end at or below",
         "got 9",
     ),
-    "no candidate": ("candidates = 24", "candidates = 0", "`steering.candidates` must be at least 1; got 0"),
+    "no candidate": (
+        "candidates = 24",
+        "candidates = 0",
+        "`steering.candidates` must be from 1 to 1,000,000; got 0",
+    ),
     "no neighbour": ("k = 20", "k = 0", "`neighbours.k` must be at least 1", "got 0"),
     "less than no neighbour": ("k = 20", "k = -3", "`neighbours.k` must be at least 1", "got -3"),
     "another star": ("k = 20", 'k = "prm"', "`neighbours.k` must be a whole number or \"prm*\"; got 'prm'"),
@@ -348,9 +352,7 @@ def test_a_full_disk(capsys, place, monkeypatch):
     before = everything(place)
     code, out, err = command(capsys, *BUILD)
     assert (code, out) == (2, "")
-    assert err.splitlines()[-1].startswith(
-        "glider-stream: the roadmap out.h5 cannot be written whole; make room"
-    )
+    assert err.splitlines()[-1].startswith("glider-stream: the roadmap out.h5 cannot be written whole; make room")
     assert everything(place) == before
 
 

@@ -88,9 +88,7 @@ def test_a_new_process_starts_from_disk_and_an_edit_is_never_stale(copy):
 
 def digest_of(folder):
     """KERNEL_DIGEST as the copy's own cache module makes it."""
-    spec = importlib.util.spec_from_file_location(
-        "cache_of_the_copy", folder / "glider_stream/kernels/cache.py"
-    )
+    spec = importlib.util.spec_from_file_location("cache_of_the_copy", folder / "glider_stream/kernels/cache.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.KERNEL_DIGEST

@@ -240,18 +240,14 @@ def test_control_towards_has_the_speed_and_the_signs_of_its_angle(glide, directi
     assert math.hypot(c.u, c.v, c.w) == pytest.approx(c.speed, rel=1e-14)
     assert math.hypot(c.u, c.v) == pytest.approx(horizontal_speed(glide, direction, angle), rel=1e-14)
     assert abs(c.w) == pytest.approx(vertical_speed(glide, direction, angle), rel=1e-14)
-    assert (
-        math.copysign(1.0, c.w) == math.copysign(1.0, c.glide_angle) == (1.0 if direction == CLIMB else -1.0)
-    )
+    assert math.copysign(1.0, c.w) == math.copysign(1.0, c.glide_angle) == (1.0 if direction == CLIMB else -1.0)
     assert math.atan2(c.v, c.u) == pytest.approx(heading, rel=1e-14)
     assert (abs(c.glide_angle), c.heading) == (angle, heading)
 
 
 @pytest.mark.parametrize("direction", [DIVE, CLIMB])
 def test_angle_of_vertical_speed_inverts_it(glide, direction):
-    low, high = (
-        vertical_speed(glide, direction, end[direction]) for end in (glide.shallowest, glide.steepest)
-    )
+    low, high = (vertical_speed(glide, direction, end[direction]) for end in (glide.shallowest, glide.steepest))
     for speed in np.linspace(low, high, 23):
         angle = angle_of_vertical_speed(glide, direction, speed)
         assert vertical_speed(glide, direction, angle) == pytest.approx(speed, rel=1e-12)

@@ -485,7 +485,7 @@ def test_a_roadmaps_edges_are_those_of_its_pairs_one_by_one(problem):
     for node in range(0, 92, 7):
         row = slice(road.indptr[node], road.indptr[node + 1])
         found = []
-        for other in problem.neighbourhood(road.position).of(road.position[node]):
+        for other in problem.legs(road.position).neighbourhood.of(road.position[node]):
             edge = problem.evaluator.connect_pair(road.position[node], road.position[other])
             if edge.status == Status.CONNECTED:
                 found.append((other, *edge[1:]))

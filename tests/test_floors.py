@@ -15,7 +15,7 @@ FLOORS = {
     2: "kernels.control",
     3: "kernels.fan kernels.steer kernels.edges errors settings",
     4: "bins glider flow domain frame ocean ocean_flow terrain",
-    5: "sampling neighbours edges",
+    5: "sampling neighbours edges legs",
     6: "roadmap",
     7: "store query",
     8: "export plot progress describe verify jobs",

@@ -93,9 +93,7 @@ def test_flow_is_the_curl_of_its_stream_function(flows, kind):
     uv = velocities(flow, x, y, z, t)
     u = (psi(flow, x, y + h, z, t) - psi(flow, x, y - h, z, t)) / (2 * h)
     v = -(psi(flow, x + h, y, z, t) - psi(flow, x - h, y, z, t)) / (2 * h)
-    np.testing.assert_allclose(
-        uv, np.stack([u, v], axis=-1), rtol=0, atol=3e-6 if kind == "rankine" else 1e-7
-    )
+    np.testing.assert_allclose(uv, np.stack([u, v], axis=-1), rtol=0, atol=3e-6 if kind == "rankine" else 1e-7)
 
 
 @pytest.mark.parametrize("kind", STREAM_FUNCTIONS)
@@ -396,9 +394,7 @@ def test_compiled_kernels_give_the_numbers_of_python(flows, evaluator, vortices,
         (lambda: Uniform(0.0, 0.0, sampled=(1.0, 0.0, 1.0)), "`flow.sampled` must be above 0"),
         (lambda: sample_flow(PUBLISHED.kernel(HEIGHTS), (1, 1, 1), (0, 1), (0, 1), (-1, 0)), "steady"),
         (
-            lambda: sample_flow(
-                Uniform(0.0, 0.0).kernel(HEIGHTS), (0.1, 0.1, 0.1), (0, 1e3), (0, 1e3), (-9, 0)
-            ),
+            lambda: sample_flow(Uniform(0.0, 0.0).kernel(HEIGHTS), (0.1, 0.1, 0.1), (0, 1e3), (0, 1e3), (-9, 0)),
             "widen",
         ),
     ],

@@ -70,9 +70,7 @@ def test_graver_rows_in_a_dive_and_mirrored_in_a_climb(gamma, alpha, speed):
         assert GRAVER.speed(radians(sign * gamma)) == pytest.approx(speed, abs=6e-7)
 
 
-@pytest.mark.parametrize(
-    ("gamma", "speed"), [(60, 1.404894), (-60, 1.404894), (90, 1.510429), (-90, 1.510429)]
-)
+@pytest.mark.parametrize(("gamma", "speed"), [(60, 1.404894), (-60, 1.404894), (90, 1.510429), (-90, 1.510429)])
 def test_steep_glides_where_an_unsigned_angle_of_attack_goes_wrong(gamma, speed):
     assert GRAVER.speed(radians(gamma)) == pytest.approx(speed, abs=6e-7)
 
@@ -348,9 +346,7 @@ def test_nothing_in_the_table_is_faster_than_its_best(model):
         best, angle = table.best_horizontal[row], table.best_angle[row]
         assert horizontal_speed(table, row, angle) == pytest.approx(best, rel=1e-14)
         for reach, count in ((1.0, 4001), (1e-3, 4001), (1e-7, 1001)):
-            near = np.clip(
-                angle + np.linspace(-reach, reach, count), table.shallowest[row], table.steepest[row]
-            )
+            near = np.clip(angle + np.linspace(-reach, reach, count), table.shallowest[row], table.steepest[row])
             speeds = np.array([horizontal_speed(table, row, x) for x in near])
             assert speeds.max() <= best
             # one maximum, up to rounding

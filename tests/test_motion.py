@@ -62,9 +62,7 @@ def test_trace_ends_where_closest_approach_says(vortices, glide, dt, close):
         c = control_towards(glide, DIVE, angle, heading)
         end = reference.replay(vortices, start, c[:3], 200.0)(200.0)
         goal = end + np.array([2.0, -1.5, 0.5])
-        miss, time = closest_approach(
-            vortices, *start, 0.0, *c[:3], *goal, Integration(dt, int(625 / dt), 5.0)
-        )
+        miss, time = closest_approach(vortices, *start, 0.0, *c[:3], *goal, Integration(dt, int(625 / dt), 5.0))
         rows = traced(vortices, *start, 0.0, *c[:3], time, dt)
         assert rows[-1, 0] == time
         assert math.dist(rows[-1, 1:], goal) == pytest.approx(miss, abs=close)

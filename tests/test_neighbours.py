@@ -62,9 +62,7 @@ def test_radius_is_the_naive_one(position, radius):
 
 
 @every_set
-@pytest.mark.parametrize(
-    "law", [Nearest(8), Nearest("prm*"), Radius(150.0), Radius("prm*"), AllNodes()], ids=str
-)
+@pytest.mark.parametrize("law", [Nearest(8), Nearest("prm*"), Radius(150.0), Radius("prm*"), AllNodes()], ids=str)
 def test_only_other_depths_rising_and_once(position, law):
     ready = law.among(position, VOLUME)
     for point in position[::5]:

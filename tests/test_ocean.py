@@ -193,9 +193,7 @@ def test_fills_are_no_water_and_do_not_reach_beside_the_coast(tmp_path, fill, de
 
 
 def test_land_written_as_zeros_is_land(tmp_path):
-    data = both(
-        dataset(), lambda one: one.where((one.lon > 20.25) & ((one.depth < 100) | (one.lat > 60.5)), 0.0)
-    )
+    data = both(dataset(), lambda one: one.where((one.lon > 20.25) & ((one.depth < 100) | (one.lat > 60.5)), 0.0))
     file = read_currents(written(tmp_path, data))
     assert sample(file, 20.1, *PLACE[1:]) is None
     assert sample(file, 20.6, 60.41, 199.0, PLACE[3]) is None
@@ -267,9 +265,7 @@ def test_vectors_point_where_water_goes_at_70_north(tmp_path):
         {"lat": lat, "lon": lon},
     )
     frame = LocalFrame(10.0, 70.0)
-    flow, _ = ocean_flow(
-        read_currents(written(tmp_path, data)), frame, (3.0, 17.0), (69.0, 71.0), (0.0, 10.0)
-    )
+    flow, _ = ocean_flow(read_currents(written(tmp_path, data)), frame, (3.0, 17.0), (69.0, 71.0), (0.0, 10.0))
     for place in ((4.0, 70.3), (16.0, 69.2), (10.0, 70.0)):
         x, y = (float(part) for part in frame.to_local(*place))
         u, v = velocity(flow, x, y, 0.0, 0.0)
@@ -303,9 +299,7 @@ def test_a_user_may_name_everything(tmp_path):
     with pytest.raises(InputError, match=r"holds no current .* p, q"):
         read_currents(path)
     names = {"u": "p", "v": "q", "lon": "a", "lat": "b", "depth": "c", "time": "d", "units": "m/s"}
-    assert sample(read_currents(path, names), *PLACE) == pytest.approx(
-        current(*PLACE[:3], 15.0), abs=TOLERANCE
-    )
+    assert sample(read_currents(path, names), *PLACE) == pytest.approx(current(*PLACE[:3], 15.0), abs=TOLERANCE)
     with pytest.raises(InputError, match="no variable `r`"):
         read_currents(path, names | {"u": "r", "v": "r"})
     with pytest.raises(InputError, match=r"names\.w"):
@@ -461,9 +455,7 @@ def test_a_surface_file_is_held_at_all_depths(tmp_path):
     assert file.surface
     assert any("held at all depths" in note for note in file.notes)
     for depth in (None, 0.0, 900.0):
-        assert sample(file, 20.63, 60.41, depth) == pytest.approx(
-            current(20.63, 60.41, 0.5, 0.0), abs=TOLERANCE
-        )
+        assert sample(file, 20.63, 60.41, depth) == pytest.approx(current(20.63, 60.41, 0.5, 0.0), abs=TOLERANCE)
 
 
 DOMAIN = (20.52, 20.98), (60.22, 60.58), (0.0, 150.0)
@@ -551,9 +543,7 @@ def test_the_index_map_is_exact_to_a_metre():
             m, n = int(p), int(q)
             a, b = p - m, q - n
             near = at.index_map[m : m + 2, n : n + 2]
-            read = (1 - a) * ((1 - b) * near[0, 0] + b * near[0, 1]) + a * (
-                (1 - b) * near[1, 0] + b * near[1, 1]
-            )
+            read = (1 - a) * ((1 - b) * near[0, 0] + b * near[0, 1]) + a * ((1 - b) * near[1, 0] + b * near[1, 1])
             back = np.interp(read[0], np.arange(lon.size), lon), np.interp(read[1], np.arange(lat.size), lat)
             assert math.hypot(*(np.array(frame.to_local(*back)) - (x, y))) <= 1.1 * MAP_ERROR
 
@@ -597,9 +587,7 @@ def test_grid_flow_from_arrays():
     mask = np.zeros((y.size, x.size), dtype=bool)
     mask[:, 0] = True
     flow, seabed = grid_flow(x, y[::-1], z, u[:, :, ::-1], v[:, :, ::-1], t, mask)
-    assert velocity(flow, 333.0, 77.0, -33.0, 1234.0) == pytest.approx(
-        (0.333 + 0.1234 - 0.066, -0.154 + 0.333)
-    )
+    assert velocity(flow, 333.0, 77.0, -33.0, 1234.0) == pytest.approx((0.333 + 0.1234 - 0.066, -0.154 + 0.333))
     assert not allowed(seabed, 40.0, 0.0, -1.0)
     assert allowed(seabed, 60.0, 0.0, -109.0)
     assert not allowed(seabed, 60.0, 0.0, -111.0)

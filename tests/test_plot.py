@@ -70,9 +70,7 @@ def ocean_scene():
     per, slot, days = (n - 1) / (hi - lo), np.zeros(1, np.uintp), 172800.0
     levels, times = np.array([-500.0, 0.0]), np.array([0.0, days])
     box = (lo, hi, lo, hi, 0.0, days)
-    flow = OceanGrid(
-        values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, *box, 0.4, 2e3
-    )
+    flow = OceanGrid(values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, *box, 0.4, 2e3)
     terrain = Seabed(bottom, 20.0, index_map, per, per, lo, lo)
     position = np.random.default_rng(1).uniform([lo, lo, -500], [hi, hi, 0], (1500, 3))
     position = position[plot.sample_water(terrain, *position.T)]
@@ -108,9 +106,7 @@ def draw(name):
     if "many" in name:
         depths = [0, *np.tile([300, 50], 60), 0]
         scene.path = zigzag((-450, 450), (450, -450), depths, 5 * 86400.0, 5.0, rows=9)
-    return plot.plot_route(
-        scene.flow, scene.terrain, scene.problem, scene.position, scene.path, title="A route"
-    )
+    return plot.plot_route(scene.flow, scene.terrain, scene.problem, scene.position, scene.path, title="A route")
 
 
 FIGURES = [

@@ -246,6 +246,4 @@ def test_a_damaged_file_never_passes_unseen(file):
 
 
 def test_a_roadmap_is_read_without_its_scenario_file(file):
-    assert scenario_from_text(read_roadmap(file).provenance.scenario) == read_scenario(
-        scenario_file(file.parent)
-    )
+    assert scenario_from_text(read_roadmap(file).provenance.scenario) == read_scenario(scenario_file(file.parent))

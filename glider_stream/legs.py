@@ -1,0 +1,144 @@
+"""Legs: what a neighbour law and a steering method find together, from nodes, from a point, to a point."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import Evaluator, FlowMapMethod
+from .flow import is_steady
+from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Pairs that were looked at: CSR `indptr` (sources + 1,), `target` (pairs,), rows of `Edge` (pairs, 7)."""
+
+    indptr: Index
+    target: Index
+    outcomes: Array
+
+
+@dataclass(frozen=True)
+class Attached:
+    """Pairs of one point with nodes (n,), either way; rows of `Edge` (n, 7)."""
+
+    nodes: Index
+    outcomes: Array
+
+
+class Legs(Protocol):
+    """How legs between the nodes of a roadmap, and points beside it, are found."""
+
+    def of(self, first: int, pairs: int) -> Found:
+        """Pairs of the nodes from `first` on, as many whole nodes as make some `pairs` pairs."""
+        ...
+
+    def away(self, point: Array) -> Attached:
+        """Pairs from a point (3,) [m] to nodes."""
+        ...
+
+    def towards(self, point: Array) -> Attached:
+        """Pairs from nodes to a point (3,) [m]."""
+        ...
+
+
+def legs_of(
+    law: NeighbourLaw | Reachable, evaluator: Evaluator, position: Array, volume: float, departure: float
+) -> Legs:
+    """The legs of a law and a method among nodes (n, 3) [m] that fill a `volume` [m^3]."""
+    if isinstance(law, Reachable):
+        return ReachableLegs(evaluator, position, departure, law.limit)
+    return NeighbourLegs(evaluator, position, departure, law.among(position, volume))
+
+
+@dataclass(frozen=True)
+class NeighbourLegs:
+    """Legs to the nodes that a neighbour law proposes."""
+
+    evaluator: Evaluator
+    position: Array
+    departure: float
+    neighbourhood: Neighbourhood
+
+    def of(self, first: int, pairs: int) -> Found:
+        """As Legs says."""
+        rows = [self.neighbourhood.of(self.position[first])]
+        count = len(rows[0])
+        while first + len(rows) < len(self.position) and count < pairs:
+            rows.append(self.neighbourhood.of(self.position[first + len(rows)]))
+            count += len(rows[-1])
+        indptr, target = as_csr(rows)
+        source = np.arange(first, first + len(rows))
+        outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
+        return Found(indptr, target, outcomes)
+
+    def away(self, point: Array) -> Attached:
+        """As Legs says."""
+        nodes = self.neighbourhood.of(point)
+        position = np.vstack([self.position[nodes], point])
+        here, others = len(nodes), np.arange(len(nodes))
+        return Attached(nodes, self.evaluator.connect(position, self.departure, [here], [0, here], others))
+
+    def towards(self, point: Array) -> Attached:
+        """As Legs says; by one fan backward in time where the method and the flow allow it."""
+        nodes = self.neighbourhood.of(point)
+        if self.evaluator.flies_backward:
+            there, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
+            return Attached(nodes[there], outcomes)
+        return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
+
+
+@dataclass(frozen=True)
+class ReachableLegs:
+    """Legs to the nodes that a fan reaches, the fastest `limit` of each vertical direction."""
+
+    evaluator: Evaluator
+    position: Array
+    departure: float
+    limit: int
+    _fan: Evaluator = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_fan", self.evaluator.by_fan())
+
+    def of(self, first: int, pairs: int) -> Found:
+        """As Legs says."""
+        room = 2 * self.limit if self.limit else len(self.position)
+        source = np.arange(first, min(first + max(1, pairs // room), len(self.position)))
+        indptr, target, outcomes = self._fan.reach(self.position, self.departure, source, self.limit)
+        if not isinstance(self.evaluator.steering, FlowMapMethod):
+            outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
+        return Found(indptr, target, outcomes)
+
+    def away(self, point: Array) -> Attached:
+        """As Legs says; all that are reached."""
+        nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, False)
+        if not isinstance(self.evaluator.steering, FlowMapMethod):
+            position, here = np.vstack([self.position[nodes], point]), len(nodes)
+            others = np.arange(here)
+            outcomes = self.evaluator.connect(position, self.departure, [here], [0, here], others)
+        return Attached(nodes, outcomes)
+
+    def towards(self, point: Array) -> Attached:
+        """As Legs says; all that reach it."""
+        if not is_steady(self.evaluator.flow):
+            nodes = np.flatnonzero(self.position[:, 2] != point[2])
+            return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
+        nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, True)
+        if not isinstance(self.evaluator.steering, FlowMapMethod):
+            return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
+        return Attached(nodes, outcomes)
+
+
+def _each_towards(
+    evaluator: Evaluator, position: Array, nodes: Index, point: Array, departure: float
+) -> Attached:
+    here = len(nodes)
+    places = np.vstack([position[nodes], point])
+    rows = np.arange(here), np.arange(here + 1), np.full(here, here)
+    return Attached(nodes, evaluator.connect(places, departure, *rows))
