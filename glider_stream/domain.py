@@ -86,7 +86,7 @@ class GeographicDomain:
         west, east = (frame.to_local(np.full(65, edge), lat)[0] for edge in (lon[0], lon[-1]))
         south, north = (frame.to_local(lon, np.full(65, edge))[1] for edge in self.lat)
         low = [west.max(), south.max(), -self.depth[1]]
-        return np.array(low), np.array([east.min(), north.min(), -self.depth[0]])
+        return np.array(low), np.array([east.min(), north.min(), 0.0 - self.depth[0]])
 
     def point(self, values: Point) -> Array:
         """A point of this domain's coordinates, lon, lat, depth, in the local frame (3,) [m]."""
@@ -95,7 +95,7 @@ class GeographicDomain:
         require(on_earth, f"{lon:g}, {lat:g} is no longitude and latitude in degrees; give LON,LAT,DEPTH")
         require(0 <= depth < math.inf, f"the depth must be at least 0 m, downward; got {depth:g}")
         x, y = self.frame().to_local(np.array([lon]), np.array([lat]))
-        return np.array([x[0], y[0], -depth])
+        return np.array([x[0], y[0], 0.0 - depth])
 
 
 def domain_from_table(table: Mapping[str, Any]) -> BoxDomain | GeographicDomain:

@@ -20,6 +20,8 @@ from .settings import require
 Array = NDArray[np.float64]
 _CONFIG: Any = numba.config  # its settings are made at run time
 MAX_CANDIDATES = 1_000_000
+NODES_AT_ONCE = 4
+"""Source nodes that a thread takes at once: few, since their work differs a hundredfold."""
 MAX_FAN, MAX_GENERATIONS = 1000, 6
 
 
@@ -133,10 +135,11 @@ class Evaluator:
         medium = self.flow, self.terrain, self.polar, self.steering.kernel()
         pairs = self.integration.kernel(), nodes, departs, sources, rows, targets
         result: Array
-        if isinstance(self.steering, FlowMapMethod):
-            result = edges.connect_all_by_fan(*medium, node_bins(nodes), *pairs)
-        else:
-            result = edges.connect_all(*medium, *pairs)
+        with numba.parallel_chunksize(NODES_AT_ONCE):
+            if isinstance(self.steering, FlowMapMethod):
+                result = edges.connect_all_by_fan(*medium, node_bins(nodes), *pairs)
+            else:
+                result = edges.connect_all(*medium, *pairs)
         return result
 
     @property
@@ -188,7 +191,8 @@ class Evaluator:
         ends = nodes, departs, np.require(point, np.float64, ["C", "W"]), departure, backward, source, limit
         room = 2 * limit if limit else min(len(nodes), 1024)
         while True:
-            counts, found = edges.connect_reachable(*medium, self.integration.kernel(), *ends, room)
+            with numba.parallel_chunksize(NODES_AT_ONCE):
+                counts, found = edges.connect_reachable(*medium, self.integration.kernel(), *ends, room)
             if counts.max() <= room:
                 return [rows[:count] for rows, count in zip(found, counts, strict=True)]
             room = int(counts.max())

@@ -286,8 +286,11 @@ def sample_flow(
     values = kernel.velocities(flow, xx, yy, zz, np.zeros(zz.size))
     values = values.reshape(counts[2], counts[0], counts[1], 2)
     steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
+    level_speed = np.hypot(values[..., 0], values[..., 1]).max(axis=(1, 2))
     return kernel.Grid(
         values=values,
+        level_speed=level_speed,
+        level_carry=np.concatenate([[0.0], np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 * steps[2])]),
         per_x=1 / steps[0],
         per_y=1 / steps[1],
         z_first=z[0],
@@ -298,7 +301,7 @@ def sample_flow(
         y_hi=box[1][1],
         t_lo=flow.t_lo,
         t_hi=flow.t_hi,
-        max_speed=float(np.hypot(values[..., 0], values[..., 1]).max()),
+        max_speed=float(level_speed.max()),
         length_scale=max(flow.length_scale / 2, steps[0], steps[1])
         if math.isfinite(flow.length_scale)
         else steps[0],

@@ -12,7 +12,6 @@ from .control import (
     CLIMB,
     DIVE,
     NO_CONTROL,
-    angle_of_vertical_speed,
     candidate_controls,
     control_towards,
     vertical_speed,
@@ -80,7 +79,7 @@ def quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integr
     if z_p == z_q:
         return SAME_DEPTH
     horizon = integration.steps * integration.dt
-    if math.isnan(angle_of_vertical_speed(polar, direction, abs(z_q - z_p) / horizon)):
+    if vertical_speed(polar, direction, polar.steepest[direction]) * horizon < abs(z_q - z_p):
         return TOO_FAR
     reach = (polar.best_horizontal[direction] + flow.max_speed) * horizon + integration.tolerance
     if math.hypot(x_q - x_p, y_q - y_p) > reach:

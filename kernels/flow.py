@@ -108,9 +108,14 @@ class Jet(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """A steady field on a regular grid, trilinear: values (levels, nx, ny, 2) [m/s], z upward."""
+    """A steady field on a regular grid, trilinear: values (levels, nx, ny, 2) [m/s], z upward.
+
+    `level_speed` (levels,) [m/s]: the greatest speed at each level; `level_carry` its integral over height.
+    """
 
     values: Array
+    level_speed: Array
+    level_carry: Array
     per_x: float
     per_y: float
     z_first: float
@@ -290,6 +295,36 @@ _VELOCITY: dict[type, Callable[..., Any]] = {
     OceanGrid: _ocean_grid,
 }
 _CONTAINS: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _in_box) | {OceanGrid: _in_ocean_grid}
+
+
+def _steady_carry(flow, z):
+    return flow.max_speed * z
+
+
+def _grid_carry(flow, z):
+    at = (z - flow.z_first) * flow.per_z
+    k, c = _cell(at, flow.level_speed.size)
+    low, high = flow.level_speed[k], flow.level_speed[k + np.uintp(1)]
+    beyond = at - (k + c)
+    speed = high if beyond > 0.0 else low
+    return flow.level_carry[k] + (c * (low + 0.5 * c * (high - low)) + beyond * speed) / flow.per_z
+
+
+_CARRY: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _steady_carry) | {Grid: _grid_carry}
+
+
+def carry(flow: Flow, z: float) -> float:
+    """The integral over height, up to z [m], of an upper bound of the current at each height [m^2/s].
+
+    A path that passes from z_1 to z_2 at a vertical speed w is carried no further by the flow than
+    |carry(z_2) - carry(z_1)| / |w|.
+    """
+    return _CARRY[type(flow)](flow, z)
+
+
+@overload(carry)
+def _carry_in_kernels(flow, z):
+    return _CARRY.get(getattr(flow, "instance_class", type(None)))
 
 
 def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float]:

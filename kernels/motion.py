@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from .cache import entry_point
-from .flow import contains, velocity
+from .flow import carry, contains, velocity
 from .terrain import allowed
 
 
@@ -61,23 +61,29 @@ def closest_approach(flow, x, y, z, t, u, v, w, x_q, y_q, z_q, integration):
     """Miss [m] and time since departure [s] of the path's closest approach to q, along its segments.
 
     Equal to the literal loop over all steps wherever that loop hits: outside the arrival window the
-    depth alone is further away than the tolerance. A path that leaves the flow, or can no longer reach q
-    in time, ends; inf is the miss of a path that never came into the window.
+    depth alone is further away than the tolerance. A path that leaves the flow ends; so does
+    one that the flow, at its fastest, could no longer carry to q in time. inf is the miss of a path that
+    never came into the window.
     """
     dt = integration.dt
     first, last = arrival_window(w, z_q - z, integration.tolerance)
     window_opens = int(first / dt)
     window_closes = min(integration.steps, int(last / dt) + 1)
-    fastest = math.hypot(u, v) + flow.max_speed
+    # what the control itself adds between the window's ends, and what may still hit
+    slack = math.hypot(u, v) * (window_closes * dt - first) + integration.tolerance
+    carry_end = carry(flow, z + window_closes * dt * w)
     miss = math.inf
     duration = math.inf
     for n in range(window_closes):
         if not contains(flow, x, y, t + n * dt):
             break
-        ahead = fastest * (window_closes - n) * dt + integration.tolerance
-        if (x_q - x) * (x_q - x) + (y_q - y) * (y_q - y) > ahead * ahead:
-            break
         z_now = z + n * dt * w
+        left = (window_closes - n) * dt
+        off_x = x_q - (x + u * left)
+        off_y = y_q - (y + v * left)
+        far = abs((carry_end - carry(flow, z_now)) / w) + slack
+        if off_x * off_x + off_y * off_y > far * far:
+            break
         x_next, y_next = rk4_step(flow, x, y, z_now, t + n * dt, u, v, w, dt)
         if n >= window_opens:
             share, distance = along_segment(x, y, z_now, x_next, y_next, z + (n + 1) * dt * w, x_q, y_q, z_q)

@@ -411,8 +411,8 @@ def test_two_thousand_random_pairs_have_one_status_each(evaluator, sampled):
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: StreamlineMethod(0), "`steering.candidates` must be at least 1; got 0"),
-        (lambda: SurfaceMethod(-1), "`steering.candidates` must be at least 1; got -1"),
+        (lambda: StreamlineMethod(0), "`steering.candidates` must be from 1 to 1,000,000; got 0"),
+        (lambda: SurfaceMethod(-1), "`steering.candidates` must be from 1 to 1,000,000; got -1"),
         (lambda: IntegrationSettings(0.0, 1, 1.0), "`integration.dt` must be above 0 s; got 0"),
         (lambda: IntegrationSettings(1.0, 0, 1.0), "`integration.steps` must be at least 1; got 0"),
         (lambda: IntegrationSettings(1.0, 1, 0.0), "`integration.tolerance` must be above 0 m; got 0"),

@@ -232,7 +232,7 @@ def test_max_speed_of_vortices_is_a_bound_at_most_twice_too_high(seed):
 
 
 def test_max_speed_knows_the_depths_of_interest():
-    deep = Vortices((Vortex(0.0, 0.0, 50.0, 1.0, 100.0, 50.0),))
+    deep = Vortices((Vortex(0.0, 0.0, 50.0, 1.0, 150.0, 50.0),))
     assert deep.kernel((-50.0, 0.0)).max_speed == pytest.approx(math.exp(-1), rel=1e-9)
     assert deep.kernel((-100.0, 0.0)).max_speed == pytest.approx(1.0, rel=1e-9)
 
@@ -262,7 +262,10 @@ def test_grid_reproduces_a_trilinear_field_exactly():
     zz, xx, yy = np.meshgrid(z, x, y, indexing="ij")
     values = np.stack(multilinear(xx, yy, zz), axis=-1)
     spans = {"x_lo": -100.0, "x_hi": 140.0, "y_lo": -50.0, "y_hi": 250.0, "t_lo": -math.inf, "t_hi": math.inf}
-    flow = Grid(values, 1 / 40, 1 / 30, -250.0, 1 / 62.5, **spans, max_speed=1.0, length_scale=40.0)
+    unused = np.zeros(len(values))
+    flow = Grid(
+        values, unused, unused, 1 / 40, 1 / 30, -250.0, 1 / 62.5, **spans, max_speed=1.0, length_scale=40.0
+    )
     rng = np.random.default_rng(6)
     px, py, pz = rng.uniform(-100, 140, 1000), rng.uniform(-50, 250, 1000), rng.uniform(-250, 0, 1000)
     # the corners too: the last cell's upper ends

@@ -56,13 +56,13 @@ def plot_route(
         norm = Normalize(frame.top, frame.bottom)
         said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         figure = new_figure(13.0, 9.8, f"{title}: {said}" if title else f"Route: {said}")
-        grid = figure.add_gridspec(2, 2, height_ratios=(2.4, 1.0), width_ratios=(1.0, 1.15))
+        grid = figure.add_gridspec(2, 3, height_ratios=(2.4, 1.0), width_ratios=(1.0, 0.03, 1.15))
         space = figure.add_subplot(grid[0, 0], projection="3d")
         draw_space(space, terrain, frame, position, label="node")
         _draw_flight(space, frame, rows, stops, norm)
         levels = map_depths(position, frame, depths)
         columns = 1 if levels.size == 1 else 2
-        cells = grid[0, 1].subgridspec(-(-levels.size // columns), columns)
+        cells = grid[0, 2].subgridspec(-(-levels.size // columns), columns)
         maps = [figure.add_subplot(cells[n // columns, n % columns]) for n in range(levels.size)]
         for n, (ax, depth) in enumerate(zip(maps, levels, strict=True)):
             draw_current(ax, flow, terrain, frame, depth, problem.departure)
