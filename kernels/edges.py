@@ -19,7 +19,7 @@ from .control import (
 from .cost import edge_cost
 from .fan import fan_guesses
 from .flow import contains
-from .motion import LANE_ROWS, LANES, arrival_window, closest_approach, is_clear
+from .motion import LANE_ROWS, LANES, arrival_window, closest_approach, is_clear, stays_inside
 from .steer import steer_lanes
 
 
@@ -276,6 +276,10 @@ def polish_groups(
                 if found[0, n] == math.inf or (known and edge_cost(found[1, n]) >= result[g, 3]):
                     continue
                 c = control_towards(polar, direction, angle[n], heading[n])
+                if not stays_inside(
+                    flow, origin[0, n], origin[1, n], origin[2, n], t, c.u, c.v, c.w, found[1, n], integration.dt
+                ):
+                    continue
                 clear = is_clear(
                     flow, terrain, origin[0, n], origin[1, n], origin[2, n], t, c.u, c.v, c.w, found[1, n],
                     integration.dt, CLEARANCE_SPACING,

@@ -114,6 +114,16 @@ def traced(flow, x, y, z, t, u, v, w, duration, dt):
 
 
 @njit
+def stays_inside(flow, x, y, z, t, u, v, w, duration, dt):
+    """Whether every step of the leg begins where the flow is known."""
+    rows = trace(flow, x, y, z, t, u, v, w, duration, dt)
+    inside = True
+    for n in range(rows.shape[0] - 1):
+        inside &= contains(flow, rows[n, 1], rows[n, 2], rows[n, 0])
+    return inside
+
+
+@njit
 def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
     """Whether the whole leg stays where `terrain` allows a glider to be, looked at every `spacing` [m]."""
     rows = trace(flow, x, y, z, t, u, v, w, duration, dt)

@@ -1,0 +1,86 @@
+import brute_force
+import numpy as np
+import pytest
+import reference
+
+from glider_stream.edges import FlowMapMethod, threads
+from glider_stream.flow import sample_flow
+
+CONNECTED, TIME, ANGLE, HEADING, SPEED, MISS = 0, 1, 3, 4, 5, 6
+
+
+@pytest.fixture(scope="module")
+def judge(evaluator, vortices):
+    wide = sample_flow(vortices, (15.0, 15.0, 12.5), (-700.0, 700.0), (-700.0, 700.0), (-250.0, 0.0))
+    return evaluator(wide, lambda candidates: FlowMapMethod())
+
+
+@pytest.fixture(scope="module")
+def position():
+    rng = np.random.default_rng(11)
+    spread = rng.uniform(-250, 250, (120, 2))
+    return np.column_stack([spread, rng.choice([0.0, -60.0, -120.0], 120)])
+
+
+def found(judge, position, source):
+    indptr, target, rows = judge.reach(position, 0.0, np.array(source), 0)
+    return np.repeat(source, np.diff(indptr)), target, rows
+
+
+def test_finds_what_brute_force_finds(judge, position):
+    source, target = np.array([3, 60, 99]), np.arange(0, 120, 2)
+    true = brute_force.fastest_legs(judge.flow, judge.polar, position, source, target, 48, 96, 5.0, 625.0)
+    legs = np.full(true.shape, np.inf)
+    for n, k, row in zip(*found(judge, position, source), strict=True):
+        if row[0] == CONNECTED:
+            legs[np.flatnonzero(source == n)[0], k] = row[TIME]
+    exists = np.isfinite(true) | np.isfinite(legs)
+    assert exists.sum() > 40
+    assert np.isfinite(legs[exists]).mean() >= 0.98
+    both = np.isfinite(true) & np.isfinite(legs)
+    assert (legs[both] <= true[both] + 1.0).mean() >= 0.99
+
+
+def test_legs_end_at_their_targets(judge, position):
+    for n, k, row in list(zip(*found(judge, position, [0, 1]), strict=True))[::7]:
+        if row[0] == CONNECTED:
+            along = row[SPEED] * np.cos(row[ANGLE])
+            c = along * np.cos(row[HEADING]), along * np.sin(row[HEADING]), row[SPEED] * np.sin(row[ANGLE])
+            end = reference.replay(judge.flow, position[n], c, row[TIME])(row[TIME])
+            assert np.linalg.norm(end - position[k]) < 0.5  # RK4 steps over the kinks of a grid
+            assert row[MISS] <= 0.01
+
+
+def test_a_fan_flown_backward_finds_the_legs_to_a_point(judge, position):
+    goal = np.array([40.0, -30.0, -120.0])
+    nodes, rows = judge.reach_point(position, goal, 0.0, True)
+    back = {int(n): row[TIME] for n, row in zip(nodes, rows, strict=True) if row[0] == CONNECTED}
+    places = np.vstack([position, goal])
+    source, target, rows = found(judge, places, np.arange(120))
+    forth = {
+        int(n): row[TIME]
+        for n, k, row in zip(source, target, rows, strict=True)
+        if k == 120 and row[0] == CONNECTED
+    }
+    assert len(forth) > 20
+    assert len(back.keys() & forth.keys()) >= 0.97 * len(back.keys() | forth.keys())
+    assert np.mean([abs(back[n] - forth[n]) < 1.0 for n in back.keys() & forth.keys()]) >= 0.97
+
+
+def test_limit_keeps_the_fastest(judge, position):
+    indptr, _, rows = judge.reach(position, 0.0, np.arange(10), 0)
+    few, _, kept = judge.reach(position, 0.0, np.arange(10), 5)
+    for n in range(10):
+        for up in (False, True):
+            row, short = rows[indptr[n] : indptr[n + 1]], kept[few[n] : few[n + 1]]
+            row, short = (a[(a[:, 0] == CONNECTED) & ((a[:, ANGLE] > 0) == up)] for a in (row, short))
+            np.testing.assert_array_equal(np.sort(short[:, TIME]), np.sort(row[:, TIME])[:5])
+
+
+def test_threads_change_no_bit(judge, position):
+    with threads(1):
+        one = judge.reach(position, 0.0, np.arange(120), 0)
+    with threads(2):
+        two = judge.reach(position, 0.0, np.arange(120), 0)
+    for a, b in zip(one, two, strict=True):
+        np.testing.assert_array_equal(a, b)
