@@ -28,14 +28,14 @@ def found(judge, position, source):
 
 
 def test_finds_what_brute_force_finds(judge, position):
-    source, target = np.array([3, 60, 99]), np.arange(0, 120, 2)
+    source, target = np.array([3, 60, 99]), np.arange(120)
     true = brute_force.fastest_legs(judge.flow, judge.polar, position, source, target, 48, 96, 5.0, 625.0)
     legs = np.full(true.shape, np.inf)
     for n, k, row in zip(*found(judge, position, source), strict=True):
-        if row[0] == CONNECTED:
-            legs[np.flatnonzero(source == n)[0], k] = row[TIME]
+        if row[0] == CONNECTED and k in target:
+            legs[np.flatnonzero(source == n)[0], np.flatnonzero(target == k)[0]] = row[TIME]
     exists = np.isfinite(true) | np.isfinite(legs)
-    assert exists.sum() > 40
+    assert exists.sum() > 30
     assert np.isfinite(legs[exists]).mean() >= 0.98
     both = np.isfinite(true) & np.isfinite(legs)
     assert (legs[both] <= true[both] + 1.0).mean() >= 0.99
