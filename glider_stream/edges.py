@@ -1,27 +1,27 @@
 """Edge evaluation for callers from Python: casts arrays, checks them, calls the kernels."""
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bins import node_bins
 from .flow import is_steady
-from .kernels import control, edges, flow, motion, terrain
+from .kernels import control, edges, flow, motion, reach, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
 from .settings import require
+from .threads import in_parallel
 
 Array = NDArray[np.float64]
-_CONFIG: Any = numba.config  # its settings are made at run time
+Index = NDArray[np.int64]
 MAX_CANDIDATES = 1_000_000
 NODES_AT_ONCE = 4
 """Source nodes that a thread takes at once: few, since their work differs a hundredfold."""
+MOST_LEGS = 1024
+"""Legs of a node for which there is room at first."""
 MAX_FAN, MAX_GENERATIONS = 1000, 6
 
 
@@ -132,14 +132,32 @@ class Evaluator:
         for name, index in (("source", sources), ("target", targets)):
             inside = index.size == 0 or (index.min() >= 0 and index.max() < len(nodes))
             require(inside, f"`{name}` must hold node numbers below {len(nodes)}; got others")
-        medium = self.flow, self.terrain, self.polar, self.steering.kernel()
-        pairs = self.integration.kernel(), nodes, departs, sources, rows, targets
+        pairs = nodes, departs, sources, rows, targets
         result: Array
-        with numba.parallel_chunksize(NODES_AT_ONCE):
-            if isinstance(self.steering, FlowMapMethod):
-                result = edges.connect_all_by_fan(*medium, node_bins(nodes), *pairs)
-            else:
-                result = edges.connect_all(*medium, *pairs)
+        if isinstance(self.steering, FlowMapMethod):
+            result = self._connect_by_fan(*pairs)
+        else:
+            medium = self.flow, self.terrain, self.polar, self.steering.kernel(), self.integration.kernel()
+            result = np.empty((targets.size, 7))
+            in_parallel(partial(edges.connect_nodes, *medium, *pairs, result), sources.size, NODES_AT_ONCE)
+        return result
+
+    def _connect_by_fan(self, nodes: Array, departs: Array, sources: Index, rows: Index, targets: Index) -> Array:
+        quick = reach.quick_statuses(
+            self.flow, self.polar, self.integration.kernel(), nodes, departs, sources, rows, targets
+        )
+        result = np.full((targets.size, 7), np.nan)
+        result[:, 0] = quick
+        may = quick == Status.NO_HIT
+        wanted = np.concatenate([[0], np.cumsum(may)])[rows].astype(np.int64), targets[may]
+        indptr, node, found = self._reach(nodes, nodes[sources], departs[sources], False, *wanted, 0)
+        # a source's row of targets may be in any order, and name one twice
+        have = np.repeat(np.arange(sources.size), np.diff(indptr)) * len(nodes) + node
+        ask = np.repeat(np.arange(sources.size), np.diff(rows)) * len(nodes) + targets
+        at = np.searchsorted(have, ask)
+        hit = may & (at < have.size)
+        hit[hit] = have[at[hit]] == ask[hit]
+        result[hit] = found[at[hit]]
         return result
 
     @property
@@ -152,50 +170,55 @@ class Evaluator:
         exact = isinstance(self.steering, FlowMapMethod)
         return self if exact else replace(self, steering=FlowMapMethod())
 
-    def reach(
-        self, position: Array, departure: float, source: NDArray[np.int64], limit: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    def reach(self, position: Array, departure: float, source: Index, limit: int) -> tuple[Index, Index, Array]:
         """The legs from each of the nodes `source` to whatever lies under its fan: (indptr, target, outcomes).
 
-        Only the fastest `limit` of each vertical direction, all where it is 0.
+        Only the fastest `limit` of each vertical direction, all where it is 0. Targets rise within a row.
         """
-        found = self._reach(position, np.zeros(3), departure, False, source, limit)
-        indptr = np.concatenate([[0], np.cumsum([len(rows) for rows in found])])
-        rows = np.concatenate([np.empty((0, 8)), *found])
-        return indptr.astype(np.int64), rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
+        nobody = np.empty(0, np.int64)
+        departs = np.full(source.size, departure)
+        return self._reach(position, position[source], departs, False, nobody, nobody, limit)
 
-    def reach_point(
-        self, position: Array, point: Array, departure: float, backward: bool
-    ) -> tuple[NDArray[np.int64], Array]:
+    def reach_point(self, position: Array, point: Array, departure: float, backward: bool) -> tuple[Index, Array]:
         """The nodes that lie under the fan of a `point` (3,) [m], and the legs to them: (nodes, outcomes).
 
         With `backward`, in a steady flow, those that reach it, and the legs from them.
         """
-        if len(position) == 0:
-            return np.empty(0, np.int64), np.empty((0, 7))
-        (rows,) = self._reach(position, point, departure, backward, np.empty(0, np.int64), 0)
-        return rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
+        nobody = np.empty(0, np.int64)
+        departs = np.full(1, departure)
+        return self._reach(position, np.reshape(point, (1, 3)), departs, backward, nobody, nobody, 0)[1:]
 
     def _reach(
         self,
         position: Array,
-        point: Array,
-        departure: float,
+        origin: Array,
+        departs: Array,
         backward: bool,
-        source: NDArray[np.int64],
+        indptr: Index,
+        target: Index,
         limit: int,
-    ) -> list[Array]:
-        nodes = np.require(position, np.float64, ["C", "W"])
-        departs = np.full(len(nodes), departure)
+    ) -> tuple[Index, Index, Array]:
+        if len(position) == 0:
+            return np.zeros(len(origin) + 1, np.int64), np.empty(0, np.int64), np.empty((0, 7))
+        nodes, points = (np.require(a, np.float64, ["C", "W"]) for a in (position, origin))
         medium = self.flow, self.terrain, self.polar, self.steering.kernel(), node_bins(nodes)
-        ends = nodes, departs, np.require(point, np.float64, ["C", "W"]), departure, backward, source, limit
-        room = 2 * limit if limit else min(len(nodes), 1024)
+        ends = nodes, points, departs, backward, indptr, target, limit
+        room = 2 * limit if limit else min(len(nodes), MOST_LEGS)
+        if indptr.size > 0:
+            room = int(np.diff(indptr).max(initial=1))
+        counts = np.zeros(len(points), np.int64)
         while True:
-            with numba.parallel_chunksize(NODES_AT_ONCE):
-                counts, found = edges.connect_reachable(*medium, self.integration.kernel(), *ends, room)
-            if counts.max() <= room:
-                return [rows[:count] for rows, count in zip(found, counts, strict=True)]
+            found = np.empty((len(points), room, reach.ROW))
+            task = partial(reach.reach_points, *medium, self.integration.kernel(), *ends, counts, found)
+            in_parallel(task, len(points), NODES_AT_ONCE)
+            if counts.max(initial=0) <= room:
+                break
             room = int(counts.max())
+        rows = found[np.arange(room) < counts[:, None]]
+        source = np.repeat(np.arange(len(points)), counts)
+        order = np.lexsort((rows[:, 0], source))
+        first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        return first, rows[order, 0].astype(np.int64), np.ascontiguousarray(rows[order, 1:])
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
         """The outcome of one pair of points (3,) [m]."""
@@ -226,18 +249,3 @@ def count_statuses(outcomes: Array) -> dict[str, int]:
     """How many pairs ended in each status, by its name in lower case."""
     counts = np.bincount(outcomes[:, 0].astype(np.int64), minlength=len(Status))
     return {status.name.lower(): int(counts[status]) for status in Status}
-
-
-@contextmanager
-def threads(count: int | None) -> Iterator[int]:
-    """Run kernels on `count` threads (all cores if None); yields the number."""
-    most, before = _CONFIG.NUMBA_NUM_THREADS, numba.get_num_threads()
-    require(
-        count is None or 1 <= count <= most,
-        f"`threads` must be from 1 to {most} on this machine; got {count}",
-    )
-    numba.set_num_threads(count or most)
-    try:
-        yield count or most
-    finally:
-        numba.set_num_threads(before)

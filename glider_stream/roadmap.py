@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import Evaluator, count_statuses, threads
+from .edges import Evaluator, count_statuses
 from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.cache import KERNEL_DIGEST
@@ -20,6 +20,7 @@ from .legs import Legs, legs_of
 from .neighbours import NeighbourLaw, Reachable
 from .sampling import Sampler
 from .settings import require
+from .threads import threads
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

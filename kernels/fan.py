@@ -18,6 +18,13 @@ from .motion import LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
 
 Index = NDArray[np.int64]
 
+NODE, ANGLE, HEADING, OUTSIDE, INVERSE = range(5)
+"""Columns of a guess: node, glide angle and heading [rad], how far outside its cell, in the cell's own units,
+and from INVERSE on d(angle, heading) / d(x, y), row by row."""
+GUESS_COLUMNS = 8
+ANGLES, HEADINGS, LEVELS = 4, 6, 8
+"""Columns of a cell: its four vertices, then its two angles, its two headings, its levels as bits."""
+CELL_COLUMNS = 9
 MAX_LEVELS = 32
 HORIZON_ROWS = 4
 """Levels whose shallowest possible glide is a row of the mesh."""
@@ -54,79 +61,84 @@ class FlowMap(NamedTuple):
 
 
 @njit
-def fan_levels(bins, z, direction, deepest, levels):
-    """The bins' levels from z outward: heights into `levels`; their number. `deepest`: as far as they go."""
+def layers_outward(bins, z, outward, deepest, levels, layers):
+    """The bins' levels from z outward, as far as `deepest` [m]: heights and layers; returns how many.
+
+    Layer k holds the nodes between level k - 1, at first z, and level k.
+    """
     count = 0
     total = bins.levels.size
     for n in range(total):
-        level = bins.levels[n] if direction == 1 else bins.levels[total - 1 - n]
-        beyond = level > z if direction == 1 else level < z
-        if not beyond:
+        m = n if outward == 1 else total - 1 - n
+        level = bins.levels[m]
+        if (level <= z) if outward == 1 else (level >= z):
             continue
         levels[count] = level
+        layers[count] = m - 1 if outward == 1 and not bins.aligned else m
         count += 1
-        if (level >= deepest) if direction == 1 else (level <= deepest):
+        if (level >= deepest) if outward == 1 else (level <= deepest):
             break
     return count
 
 
 @njit
-def fan_rows(steering, polar, direction, z, levels, count, horizon, rows):
+def fan_rows(steering, polar, direction, rises, horizon, rows):
     """Glide angles of the base mesh's rows, rising, into `rows`; their number, 0 where no level is in reach.
 
-    Even steps over the angles that reach the first level, and the shallowest that reaches some of the others.
+    `rises` [m]: how far each level lies above or below. Even steps over the angles that reach the first
+    level, and the shallowest that reaches some of the others.
     """
-    shallow = angle_of_vertical_speed(polar, direction, abs(levels[0] - z) / horizon)
+    shallow = angle_of_vertical_speed(polar, direction, rises[0] / horizon)
     if math.isnan(shallow):
         return 0
     steep = polar.steepest[direction]
-    for n in range(steering.angles):
-        rows[n] = shallow + (steep - shallow) * n / (steering.angles - 1)
     filled = steering.angles
-    extra = min(HORIZON_ROWS, count - 1)
+    for n in range(filled):
+        rows[n] = shallow + (steep - shallow) * n / (steering.angles - 1)
+    extra = min(HORIZON_ROWS, rises.size - 1)
     for n in range(extra):
-        level = levels[1 + n * (count - 1) // extra]
-        angle = angle_of_vertical_speed(polar, direction, abs(level - z) / horizon)
-        if not math.isnan(angle):
-            rows[filled] = angle
-            filled += 1
-    rows[:filled].sort()
-    kept = 1
-    for n in range(1, filled):
-        if rows[n] > rows[kept - 1] + 1e-9:
-            rows[kept] = rows[n]
-            kept += 1
-    return kept
+        angle = angle_of_vertical_speed(polar, direction, rises[1 + n * (rises.size - 1) // extra] / horizon)
+        place = filled
+        while place > 0 and rows[place - 1] > angle:
+            place -= 1
+        if math.isnan(angle) or place == 0 or angle - rows[place - 1] < 1e-9:
+            continue
+        if place < filled and rows[place] - angle < 1e-9:
+            continue
+        for m in range(filled, place, -1):
+            rows[m] = rows[m - 1]
+        rows[place] = angle
+        filled += 1
+    return filled if steep > shallow else 0
 
 
 @njit
-def land_on_levels(
-    flow, polar, direction, x, y, z, t, levels, angle, heading, first, last, depth, dt, landing, lanes
-):
-    """Fly controls first..last - 1 from (x, y, z) through `levels`; landings into `landing` (n, levels, 2).
+def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, last, dt, landing, lanes):
+    """Fly the controls of vertices first..last - 1 from (x, y, z) at t through `levels`, into rows of `landing`.
 
-    `depth[n]`: how many levels control n is flown through. Levels against the control's direction fly it back
-    in time, to where it would have left to land at (x, y, z): in a steady flow the flow map's inverse.
+    `vertex` (n, 3): glide angle, heading, and through how many levels; `landing` (n, 2 levels): x, y at each.
+    Levels against the control's direction fly it back in time, to where it would have left to land at
+    (x, y, z): in a steady flow the flow map's inverse.
     """
     for begin in range(first, last, LANES):
-        through = 0
+        most = 0
         for n in range(LANES):
             one = min(begin + n, last - 1)
-            speed = glide_speed(polar, direction, angle[one])
-            along = speed * math.cos(angle[one])
-            lanes[U, n] = along * math.cos(heading[one])
-            lanes[V, n] = along * math.sin(heading[one])
-            lanes[W, n] = (2.0 * direction - 1.0) * speed * math.sin(angle[one])
+            speed = glide_speed(polar, direction, vertex[one, 0])
+            along = speed * math.cos(vertex[one, 0])
+            lanes[U, n] = along * math.cos(vertex[one, 1])
+            lanes[V, n] = along * math.sin(vertex[one, 1])
+            lanes[W, n] = (2.0 * direction - 1.0) * speed * math.sin(vertex[one, 0])
             lanes[X, n], lanes[Y, n], lanes[Z, n], lanes[T, n] = x, y, z, t
-            through = max(through, depth[one])
+            most = max(most, int(vertex[one, 2]))
         height = z
-        for level in range(through):
+        for level in range(most):
             rise = levels[level] - height
             steps = 1
             for n in range(LANES):
                 one = min(begin + n, last - 1)
-                # a lane beyond its own depth stands still
-                lanes[H, n] = rise / lanes[W, n] if level < depth[one] else 0.0
+                # a lane beyond its own levels stands still
+                lanes[H, n] = rise / lanes[W, n] if level < vertex[one, 2] else 0.0
                 steps = max(steps, math.ceil(abs(lanes[H, n]) / dt))
             for n in range(LANES):
                 lanes[H, n] /= steps
@@ -135,17 +147,9 @@ def land_on_levels(
             height = levels[level]
             for n in range(LANES):
                 lanes[Z, n] = height
-                if begin + n < last and level < depth[begin + n]:
-                    landing[begin + n, level, 0] = lanes[X, n]
-                    landing[begin + n, level, 1] = lanes[Y, n]
-
-
-class Slab(NamedTuple):
-    """The nodes between two heights [m] of a fan, `start` where it comes from: `layer` of the bins."""
-
-    layer: int
-    start: float
-    end: float
+                if begin + n < last and level < vertex[begin + n, 2]:
+                    landing[begin + n, 2 * level] = lanes[X, n]
+                    landing[begin + n, 2 * level + 1] = lanes[Y, n]
 
 
 @njit(inline="always")
@@ -156,15 +160,17 @@ def _bin_range(low, high, origin, per_bin, count):
 
 
 @njit
-def any_wanted(bins, slab, position, wanted, x_lo, x_hi, y_lo, y_hi):
-    """Whether a wanted node of the slab lies in the rectangle [m]."""
+def any_wanted(bins, layer, position, wanted, x_lo, x_hi, y_lo, y_hi):
+    """Whether a wanted node of the layer lies in the rectangle [m]."""
     i_first, i_last = _bin_range(x_lo, x_hi, bins.x_lo, bins.per_bin, bins.nx)
     j_first, j_last = _bin_range(y_lo, y_hi, bins.y_lo, bins.per_bin, bins.ny)
     for i in range(i_first, i_last + 1):
-        row = (slab.layer * bins.nx + i) * bins.ny
+        row = (layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
             node = bins.node[k]
-            if wanted[node] and x_lo <= position[node, 0] <= x_hi and y_lo <= position[node, 1] <= y_hi:
+            if not (x_lo <= position[node, 0] <= x_hi and y_lo <= position[node, 1] <= y_hi):
+                continue
+            if wanted.size == 0 or wanted[node]:
                 return True
     return False
 
@@ -181,39 +187,59 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
 
 
 @njit
-def guess_in_cell(bins, slab, position, wanted, image, angles, headings, guesses, count):
+def longer(rows):
+    """The rows, and as many empty ones."""
+    grown = np.empty((2 * rows.shape[0], rows.shape[1]))
+    for n in range(rows.shape[0]):
+        for m in range(rows.shape[1]):
+            grown[n, m] = rows[n, m]
+    return grown
+
+
+@njit
+def _corners(landing, cell, level, x, y, image):
+    """Landings of the cell's corners at a level and at the one before it; the rectangle about them."""
+    for c in range(4):
+        vertex = int(cell[c])
+        for m in range(2):
+            image[0, c, m] = landing[vertex, 2 * level + m]
+            image[1, c, m] = landing[vertex, 2 * level - 2 + m] if level > 0 else (x if m == 0 else y)
+
+
+@njit
+def _around(bins, image):
+    """The rectangle about the cell's images: x_lo, x_hi, y_lo, y_hi [m]."""
+    x_lo, x_hi, y_lo, y_hi = math.inf, -math.inf, math.inf, -math.inf
+    for c in range(4):
+        for end in range(1 if bins.aligned else 2):
+            x_lo, x_hi = min(x_lo, image[end, c, 0]), max(x_hi, image[end, c, 0])
+            y_lo, y_hi = min(y_lo, image[end, c, 1]), max(y_hi, image[end, c, 1])
+    return x_lo, x_hi, y_lo, y_hi
+
+
+@njit
+def guess_in_cell(bins, layer, start, end, position, wanted, z, image, cell, guesses, count):
     """First guesses for the wanted nodes under one cell; returns (guesses, count).
 
-    `image` (3, 4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at the slab's end and at
-    its start; the third is scratch. A row of `guesses`: node, angle, heading, how far outside the cell, and
-    d(angle, heading) / d(x, y).
+    `image` (3, 4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at the layer's `end` and
+    at its `start` [m]; the third is scratch.
     """
     corners, before, at = image[0], image[1], image[2]
-    x_lo = min(corners[0, 0], corners[1, 0], corners[2, 0], corners[3, 0])
-    x_hi = max(corners[0, 0], corners[1, 0], corners[2, 0], corners[3, 0])
-    y_lo = min(corners[0, 1], corners[1, 1], corners[2, 1], corners[3, 1])
-    y_hi = max(corners[0, 1], corners[1, 1], corners[2, 1], corners[3, 1])
-    if not bins.aligned:
-        x_lo = min(x_lo, before[0, 0], before[1, 0], before[2, 0], before[3, 0])
-        x_hi = max(x_hi, before[0, 0], before[1, 0], before[2, 0], before[3, 0])
-        y_lo = min(y_lo, before[0, 1], before[1, 1], before[2, 1], before[3, 1])
-        y_hi = max(y_hi, before[0, 1], before[1, 1], before[2, 1], before[3, 1])
+    x_lo, x_hi, y_lo, y_hi = _around(bins, image)
     room = MARGIN * max(x_hi - x_lo, y_hi - y_lo)
     i_first, i_last = _bin_range(x_lo - room, x_hi + room, bins.x_lo, bins.per_bin, bins.nx)
     j_first, j_last = _bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
-    da = angles[1] - angles[0]
-    dh = headings[1] - headings[0]
+    da = cell[ANGLES + 1] - cell[ANGLES]
+    dh = cell[HEADINGS + 1] - cell[HEADINGS]
     for i in range(i_first, i_last + 1):
-        row = (slab.layer * bins.nx + i) * bins.ny
+        row = (layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
             node = bins.node[k]
-            if not wanted[node]:
-                continue
             x, y = position[node, 0], position[node, 1]
             if x < x_lo - room or x > x_hi + room or y < y_lo - room or y > y_hi + room:
                 continue
-            f = (position[node, 2] - slab.start) / (slab.end - slab.start)
-            if not 0.0 < f <= 1.0:
+            f = (position[node, 2] - start) / (end - start)
+            if position[node, 2] == z or f < 0.0 or f > 1.0 or not (wanted.size == 0 or wanted[node]):
                 continue
             for c in range(4):
                 for m in range(2):
@@ -230,336 +256,233 @@ def guess_in_cell(bins, slab, position, wanted, image, angles, headings, guesses
                     continue
                 if best == math.inf:
                     if count == guesses.shape[0]:
-                        longer = np.empty((2 * count, 8))
-                        longer[:count] = guesses
-                        guesses = longer
+                        guesses = longer(guesses)
                     count += 1
                 best = outside
-                sign = 1.0 - 2.0 * upper
-                angle = angles[upper] + sign * s * da
-                heading = headings[upper] + sign * r * dh
                 # the triangle's own legs are -da, -dh long in the upper one
+                sign = 1.0 - 2.0 * upper
                 ga = sign * da / det
                 gh = sign * dh / det
-                guesses[count - 1, 0] = node
-                guesses[count - 1, 1] = angle
-                guesses[count - 1, 2] = heading
-                guesses[count - 1, 3] = outside
-                guesses[count - 1, 4] = ga * (at[q, 1] - at[o, 1])
-                guesses[count - 1, 5] = -ga * (at[q, 0] - at[o, 0])
-                guesses[count - 1, 6] = -gh * (at[p, 1] - at[o, 1])
-                guesses[count - 1, 7] = gh * (at[p, 0] - at[o, 0])
+                guess = guesses[count - 1]
+                guess[NODE] = node
+                guess[ANGLE] = cell[ANGLES + upper] + sign * s * da
+                guess[HEADING] = cell[HEADINGS + upper] + sign * r * dh
+                guess[OUTSIDE] = outside
+                guess[INVERSE] = ga * (at[q, 1] - at[o, 1])
+                guess[INVERSE + 1] = -ga * (at[q, 0] - at[o, 0])
+                guess[INVERSE + 2] = -gh * (at[p, 1] - at[o, 1])
+                guess[INVERSE + 3] = gh * (at[p, 0] - at[o, 0])
     return guesses, count
 
 
 @njit(inline="always")
 def _bend(landing, a, b, middle, level):
     """How far [m] a landing lies from the middle of two others."""
-    x = landing[middle, level, 0] - 0.5 * (landing[a, level, 0] + landing[b, level, 0])
-    y = landing[middle, level, 1] - 0.5 * (landing[a, level, 1] + landing[b, level, 1])
-    return math.hypot(x, y)
+    x = landing[middle, 2 * level] - 0.5 * (landing[a, 2 * level] + landing[b, 2 * level])
+    y = landing[middle, 2 * level + 1] - 0.5 * (landing[a, 2 * level + 1] + landing[b, 2 * level + 1])
+    return math.sqrt(x * x + y * y)
 
 
 @njit
-def _corners(landing, cell, level, x, y, corners, before):
-    for c in range(4):
-        corners[c, 0] = landing[cell[c], level, 0]
-        corners[c, 1] = landing[cell[c], level, 1]
-        before[c, 0] = landing[cell[c], level - 1, 0] if level > 0 else x
-        before[c, 1] = landing[cell[c], level - 1, 1] if level > 0 else y
-
-
-@njit
-def _turned(c):
-    """Whether the cell is folded: its two triangles are turned opposite ways."""
+def _folded(c):
+    """Whether the two triangles of a cell are turned opposite ways."""
     low = (c[2, 0] - c[0, 0]) * (c[1, 1] - c[0, 1]) - (c[1, 0] - c[0, 0]) * (c[2, 1] - c[0, 1])
     high = (c[1, 0] - c[3, 0]) * (c[2, 1] - c[3, 1]) - (c[2, 0] - c[3, 0]) * (c[1, 1] - c[3, 1])
     return low * high <= 0.0
 
 
 @njit
-def _wants_halving(bins, slab, position, wanted, corners, before, bend):
+def wants_halving(bins, layer, position, wanted, image, bend):
     """Whether a cell bent by `bend` [m], or folded, has a wanted node within the bend or the fold's reach."""
-    x_lo = min(corners[:, 0].min(), before[:, 0].min() if not bins.aligned else math.inf)
-    x_hi = max(corners[:, 0].max(), before[:, 0].max() if not bins.aligned else -math.inf)
-    y_lo = min(corners[:, 1].min(), before[:, 1].min() if not bins.aligned else math.inf)
-    y_hi = max(corners[:, 1].max(), before[:, 1].max() if not bins.aligned else -math.inf)
-    folded = _turned(corners)
+    folded = _folded(image[0])
     if bend <= BENT and not folded:
         return False
+    x_lo, x_hi, y_lo, y_hi = _around(bins, image)
     room = max(bend, 0.25 * max(x_hi - x_lo, y_hi - y_lo)) if folded else bend
-    return any_wanted(bins, slab, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
+    return any_wanted(bins, layer, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
 
 
 @njit
 def fan_guesses(
-    flow,
-    polar,
-    steering,
-    bins,
-    position,
-    wanted,
-    direction,
-    backward,
-    x,
-    y,
-    z,
-    t,
-    deepest,
-    dt,
-    horizon,
-    lanes,
-):
-    """First guesses for the wanted nodes that a node at (x, y, z) may reach in one vertical direction.
+    flow, polar, steering, bins, position, wanted, direction, backward, x, y, z, t, deepest, dt, horizon, lanes
+):  # fmt: skip
+    """First guesses for the wanted nodes that (x, y, z) may reach within `horizon` [s], one vertical direction.
 
-    The wanted nodes lie no further than `deepest` [m]. With `backward`, those that may reach it, and the
-    controls that they would take. Returns (guesses, count), rows as `guess_in_cell` has them.
+    `wanted` (nodes,), all where it is empty; none lies further than `deepest` [m]. With `backward`, those
+    that may reach it, and the controls that they would take. Returns (guesses, count).
     """
-    guesses = np.empty((256, 8))
-    count = 0
+    guesses = np.empty((256, GUESS_COLUMNS))
+    count = np.int64(0)  # not a literal: what takes it is compiled once
     levels = np.empty(MAX_LEVELS)
+    layers = np.empty(MAX_LEVELS, np.int64)
     outward = 1 - direction if backward else direction
-    reached = fan_levels(bins, z, outward, deepest, levels)
+    reached = layers_outward(bins, z, outward, deepest, levels, layers)
+    fastest = vertical_speed(polar, direction, polar.steepest[direction]) * horizon * (1.0 + 1e-9)
+    while reached > 1 and abs(levels[reached - 2] - z) > fastest:
+        reached -= 1
     if reached == 0:
         return guesses, count
     levels = levels[:reached]
     rows = np.empty(steering.angles + HORIZON_ROWS)
-    row_count = fan_rows(steering, polar, direction, z, levels, reached, horizon, rows)
-    if row_count < 2:
+    rises = np.abs(levels - z)
+    if not bins.aligned:
+        # the nodes of the first layer may lie as near as they like
+        rises[0] = 0.0
+    row_count = fan_rows(steering, polar, direction, rises, horizon, rows)
+    if row_count == 0:
         return guesses, count
     columns = steering.headings
-    slack = 0 if bins.aligned else 1
-    capacity = 4 * row_count * columns
-    angle = np.empty(capacity)
-    heading = np.empty(capacity)
-    depth = np.empty(capacity, np.int64)
-    landing = np.empty((capacity, reached, 2))
     vertices = row_count * columns
+    vertex = np.empty((4 * vertices, 3))
+    landing = np.empty((4 * vertices, 2 * reached))
     for i in range(row_count):
-        fastest = vertical_speed(polar, direction, rows[i]) * horizon * (1.0 + 1e-9)
+        furthest = vertical_speed(polar, direction, rows[i]) * horizon * (1.0 + 1e-9)
         through = 0
-        while through < reached and abs(levels[through] - z) <= fastest:
+        while through < reached and abs(levels[through] - z) <= furthest:
             through += 1
         for j in range(columns):
-            angle[i * columns + j] = rows[i]
-            heading[i * columns + j] = 2.0 * math.pi * j / columns
-            depth[i * columns + j] = min(through + slack, reached)
-    land_on_levels(
-        flow, polar, direction, x, y, z, t, levels, angle, heading, 0, vertices, depth, dt, landing, lanes
-    )
+            vertex[i * columns + j, 0] = rows[i]
+            vertex[i * columns + j, 1] = 2.0 * math.pi * j / columns
+            # nodes between levels: one more, to interpolate
+            vertex[i * columns + j, 2] = through if bins.aligned else min(through + 1, reached)
+    first = np.int64(0)
+    land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, vertices, dt, landing, lanes)
 
     image = np.empty((3, 4, 2))
-    corners, before = image[0], image[1]
-    cell = np.empty(4, np.int64)
-    angles = np.empty(2)
-    headings = np.empty(2)
-    slabs = [_slab(bins, outward, z, levels, k) for k in range(reached)]
-    # cells to halve: corners, base angle and heading, generation by generation; levels as bits
-    queue = np.empty((256, 4), np.int64)
-    span = np.empty((256, 4))
-    todo = np.zeros(256, np.int64)
+    cell = np.empty(CELL_COLUMNS)
+    cells = np.empty((256, CELL_COLUMNS))
     waiting = 0
     for i in range(row_count - 1):
         for j in range(columns):
-            right = (j + 1) % columns
-            cell[0] = i * columns + j
-            cell[1] = i * columns + right
-            cell[2] = cell[0] + columns
-            cell[3] = cell[1] + columns
-            angles[0], angles[1] = rows[i], rows[i + 1]
-            headings[0] = 2.0 * math.pi * j / columns
-            headings[1] = 2.0 * math.pi * (j + 1) / columns
+            base_cell(rows, columns, i, j, cell)
             bits = 0
-            for k in range(min(depth[cell[0]], depth[cell[2]])):
-                _corners(landing, cell, k, x, y, corners, before)
-                bend = _base_bend(landing, rows, row_count, columns, depth, i, j, k)
-                if steering.generations > 0 and _wants_halving(
-                    bins, slabs[k], position, wanted, corners, before, bend
-                ):
+            for k in range(int(min(vertex[i * columns, 2], vertex[(i + 1) * columns, 2]))):
+                _corners(landing, cell, k, x, y, image)
+                bend = base_bend(landing, vertex, rows, row_count, columns, i, j, k)
+                if steering.generations > 0 and wants_halving(bins, layers[k], position, wanted, image, bend):
                     bits |= 1 << k
                 else:
+                    start = levels[k - 1] if k > 0 else z
                     guesses, count = guess_in_cell(
-                        bins, slabs[k], position, wanted, image, angles, headings, guesses, count
+                        bins, layers[k], start, levels[k], position, wanted, z, image, cell, guesses, count
                     )
             if bits:
-                queue, span, todo, waiting = _push(queue, span, todo, waiting, cell, angles, headings, bits)
+                if waiting == cells.shape[0]:
+                    cells = longer(cells)
+                cell[LEVELS] = bits
+                cells[waiting] = cell
+                waiting += 1
     generation = 0
-    first = 0
-    while first < waiting:
+    done = 0
+    while done < waiting:
         generation += 1
         last = waiting
-        new = vertices
-        need = vertices + 5 * (last - first)
-        if need > angle.size:
-            angle, heading, depth, landing = _grown(angle, heading, depth, landing, 2 * need)
-        for c in range(first, last):
-            through = 0
-            while (todo[c] >> through) > 0:
-                through += 1
-            a_mid = 0.5 * (span[c, 0] + span[c, 1])
-            h_mid = 0.5 * (span[c, 2] + span[c, 3])
-            # middles: (a0, hm), (am, h0), (am, hm), (am, h1), (a1, hm)
-            for m in range(5):
-                angle[new + m] = span[c, 0] if m == 0 else (span[c, 1] if m == 4 else a_mid)
-                heading[new + m] = span[c, 2] if m == 1 else (span[c, 3] if m == 3 else h_mid)
-                depth[new + m] = through
-            new += 5
-        land_on_levels(
-            flow,
-            polar,
-            direction,
-            x,
-            y,
-            z,
-            t,
-            levels,
-            angle,
-            heading,
-            vertices,
-            new,
-            depth,
-            dt,
-            landing,
-            lanes,
-        )
-        for c in range(first, last):
-            mid = vertices + 5 * (c - first)
-            v = queue[c].copy()
-            lines = span[c].copy()
-            bits_of = np.zeros(4, np.int64)
-            for k in range(reached):
-                if not (todo[c] >> k) & 1:
-                    continue
-                bend = max(
-                    _bend(landing, v[0], v[1], mid, k),
-                    _bend(landing, v[0], v[2], mid + 1, k),
-                    _bend(landing, v[0], v[3], mid + 2, k),
-                    _bend(landing, v[1], v[2], mid + 2, k),
-                    _bend(landing, v[1], v[3], mid + 3, k),
-                    _bend(landing, v[2], v[3], mid + 4, k),
-                )
-                for child in range(4):
-                    _child(v, lines, mid, child, cell, angles, headings)
-                    _corners(landing, cell, k, x, y, corners, before)
-                    # halving a cell quarters its bend
-                    if generation < steering.generations and _wants_halving(
-                        bins, slabs[k], position, wanted, corners, before, 0.25 * bend
-                    ):
-                        bits_of[child] |= 1 << k
-                    else:
-                        guesses, count = guess_in_cell(
-                            bins,
-                            slabs[k],
-                            position,
-                            wanted,
-                            image,
-                            angles,
-                            headings,
-                            guesses,
-                            count,
-                        )
+        while vertices + 5 * (last - done) > vertex.shape[0]:
+            vertex, landing = longer(vertex), longer(landing)
+        for c in range(done, last):
+            middles(cells[c], vertex, vertices + 5 * (c - done))
+        new = vertices + 5 * (last - done)
+        land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, vertices, new, dt, landing, lanes)
+        for c in range(done, last):
+            mid = vertices + 5 * (c - done)
+            bits = int(cells[c, LEVELS])
             for child in range(4):
-                if bits_of[child]:
-                    _child(v, lines, mid, child, cell, angles, headings)
-                    queue, span, todo, waiting = _push(
-                        queue, span, todo, waiting, cell, angles, headings, bits_of[child]
-                    )
+                quarter(cells[c], mid, child, cell)
+                left = 0
+                for k in range(reached):
+                    if not (bits >> k) & 1:
+                        continue
+                    _corners(landing, cell, k, x, y, image)
+                    # halving a cell quarters its bend
+                    bend = 0.25 * bend_of(landing, cells[c], mid, k)
+                    if generation < steering.generations and wants_halving(
+                        bins, layers[k], position, wanted, image, bend
+                    ):
+                        left |= 1 << k
+                    else:
+                        start = levels[k - 1] if k > 0 else z
+                        guesses, count = guess_in_cell(
+                            bins, layers[k], start, levels[k], position, wanted, z, image, cell, guesses, count
+                        )
+                if left:
+                    if waiting == cells.shape[0]:
+                        cells = longer(cells)
+                    cell[LEVELS] = left
+                    cells[waiting] = cell
+                    waiting += 1
         vertices = new
-        first = last
+        done = last
     return guesses, count
 
 
 @njit
-def _slab(bins, outward, z, levels, k):
-    start = levels[k - 1] if k > 0 else z
-    layer = int(np.searchsorted(bins.levels, levels[k]))
-    if outward == 1 and not bins.aligned:
-        layer -= 1
-    return Slab(layer, start, levels[k])
+def base_cell(rows, columns, i, j, cell):
+    """Cell (i, j) of the base mesh, between rows i, i + 1 and columns j, j + 1."""
+    right = (j + 1) % columns
+    cell[0], cell[1] = i * columns + j, i * columns + right
+    cell[2], cell[3] = cell[0] + columns, cell[1] + columns
+    cell[ANGLES], cell[ANGLES + 1] = rows[i], rows[i + 1]
+    cell[HEADINGS], cell[HEADINGS + 1] = 2.0 * math.pi * j / columns, 2.0 * math.pi * (j + 1) / columns
 
 
 @njit
-def _base_bend(landing, rows, row_count, columns, depth, i, j, k):
+def base_bend(landing, vertex, rows, row_count, columns, i, j, k):
     """The bend [m] of a base cell, from second differences along its sides and its twist."""
     bend = 0.0
+    step = rows[i + 1] - rows[i]
     for row in (i, i + 1):
-        here = row * columns
         for side in (j, (j + 1) % columns):
-            bend = max(
-                bend,
-                0.25 * _bend(landing, here + (side - 1) % columns, here + (side + 1) % columns, here + side, k),
-            )
-    for side in (j, (j + 1) % columns):
-        for row in (i, i + 1):
-            up = (row + 1) * columns + side
-            down = (row - 1) * columns + side
-            if 0 < row < row_count - 1 and k < depth[down]:
+            here = row * columns + side
+            before, after = row * columns + (side - 1) % columns, row * columns + (side + 1) % columns
+            bend = max(bend, 0.25 * _bend(landing, before, after, here, k))
+            up, down = here + columns, here - columns
+            if 0 < row < row_count - 1 and k < vertex[down, 2]:
                 # rows are uneven: the second derivative times half a step squared, over two
                 low, high = rows[row] - rows[row - 1], rows[row + 1] - rows[row]
-                here = row * columns + side
-                step = rows[i + 1] - rows[i]
-                second = np.empty(2)
-                for m in range(2):
-                    second[m] = (
-                        2.0
-                        * (
-                            (landing[up, k, m] - landing[here, k, m]) / high
-                            - (landing[here, k, m] - landing[down, k, m]) / low
-                        )
-                        / (low + high)
-                    )
-                bend = max(bend, math.hypot(second[0], second[1]) * step * step / 8.0)
-    right = (j + 1) % columns
-    a, b = i * columns + j, i * columns + right
+                x = (landing[up, 2 * k] - landing[here, 2 * k]) / high
+                x -= (landing[here, 2 * k] - landing[down, 2 * k]) / low
+                y = (landing[up, 2 * k + 1] - landing[here, 2 * k + 1]) / high
+                y -= (landing[here, 2 * k + 1] - landing[down, 2 * k + 1]) / low
+                bend = max(bend, math.sqrt(x * x + y * y) / (low + high) * step * step / 4.0)
+    a, b = i * columns + j, i * columns + (j + 1) % columns
     c, d = a + columns, b + columns
-    x = landing[a, k, 0] - landing[b, k, 0] - landing[c, k, 0] + landing[d, k, 0]
-    y = landing[a, k, 1] - landing[b, k, 1] - landing[c, k, 1] + landing[d, k, 1]
+    x = landing[a, 2 * k] - landing[b, 2 * k] - landing[c, 2 * k] + landing[d, 2 * k]
+    y = landing[a, 2 * k + 1] - landing[b, 2 * k + 1] - landing[c, 2 * k + 1] + landing[d, 2 * k + 1]
     return max(bend, 0.25 * math.hypot(x, y))
 
 
 @njit
-def _child(v, lines, mid, child, cell, angles, headings):
-    """Quarter `child` of a cell: its corners, angles and headings."""
-    a_mid = 0.5 * (lines[0] + lines[1])
-    h_mid = 0.5 * (lines[2] + lines[3])
-    if child == 0:
-        cell[0], cell[1], cell[2], cell[3] = v[0], mid, mid + 1, mid + 2
-    elif child == 1:
-        cell[0], cell[1], cell[2], cell[3] = mid, v[1], mid + 2, mid + 3
-    elif child == 2:
-        cell[0], cell[1], cell[2], cell[3] = mid + 1, mid + 2, v[2], mid + 4
-    else:
-        cell[0], cell[1], cell[2], cell[3] = mid + 2, mid + 3, mid + 4, v[3]
-    angles[0], angles[1] = (lines[0], a_mid) if child < 2 else (a_mid, lines[1])
-    headings[0], headings[1] = (lines[2], h_mid) if child % 2 == 0 else (h_mid, lines[3])
+def middles(cell, vertex, mid):
+    """Controls that halve a cell, into vertices from `mid`: (a0, hm), (am, h0), (am, hm), (am, h1), (a1, hm)."""
+    through = 0
+    while (int(cell[LEVELS]) >> through) > 0:
+        through += 1
+    for m in range(5):
+        a = 0.0 if m == 0 else (1.0 if m == 4 else 0.5)
+        h = 0.0 if m == 1 else (1.0 if m == 3 else 0.5)
+        vertex[mid + m, 0] = (1.0 - a) * cell[ANGLES] + a * cell[ANGLES + 1]
+        vertex[mid + m, 1] = (1.0 - h) * cell[HEADINGS] + h * cell[HEADINGS + 1]
+        vertex[mid + m, 2] = through
 
 
 @njit
-def _push(queue, span, todo, waiting, cell, angles, headings, bits):
-    if waiting == todo.size:
-        longer_queue = np.empty((2 * waiting, 4), np.int64)
-        longer_span = np.empty((2 * waiting, 4))
-        longer_todo = np.zeros(2 * waiting, np.int64)
-        longer_queue[:waiting] = queue
-        longer_span[:waiting] = span
-        longer_todo[:waiting] = todo
-        queue, span, todo = longer_queue, longer_span, longer_todo
-    queue[waiting] = cell
-    span[waiting, 0], span[waiting, 1] = angles[0], angles[1]
-    span[waiting, 2], span[waiting, 3] = headings[0], headings[1]
-    todo[waiting] = bits
-    return queue, span, todo, waiting + 1
+def bend_of(landing, cell, mid, k):
+    """The bend [m] of a cell whose middles are landed: along its sides and both diagonals."""
+    a, b, c, d = int(cell[0]), int(cell[1]), int(cell[2]), int(cell[3])
+    sides = max(_bend(landing, a, b, mid, k), _bend(landing, a, c, mid + 1, k))
+    sides = max(sides, _bend(landing, b, d, mid + 3, k), _bend(landing, c, d, mid + 4, k))
+    return max(sides, _bend(landing, a, d, mid + 2, k), _bend(landing, b, c, mid + 2, k))
 
 
 @njit
-def _grown(angle, heading, depth, landing, size):
-    used = angle.size
-    longer_angle = np.empty(size)
-    longer_heading = np.empty(size)
-    longer_depth = np.empty(size, np.int64)
-    longer_landing = np.empty((size, landing.shape[1], 2))
-    longer_angle[:used] = angle
-    longer_heading[:used] = heading
-    longer_depth[:used] = depth
-    longer_landing[:used] = landing
-    return longer_angle, longer_heading, longer_depth, longer_landing
+def quarter(parent, mid, child, cell):
+    """Quarter `child` of a cell: 0 to 3, in the order of its corners."""
+    for c in range(4):
+        # rows and columns of the parent's 3 x 3 vertices, whose corners are its own and the rest its middles
+        i, j = child // 2 + c // 2, child % 2 + c % 2
+        corner = i % 2 == 0 and j % 2 == 0
+        cell[c] = parent[i + j // 2] if corner else mid + 2 * i + j - 1
+    for m in range(2):
+        i, j = child // 2 + m, child % 2 + m
+        cell[ANGLES + m] = (1.0 - 0.5 * i) * parent[ANGLES] + 0.5 * i * parent[ANGLES + 1]
+        cell[HEADINGS + m] = (1.0 - 0.5 * j) * parent[HEADINGS] + 0.5 * j * parent[HEADINGS + 1]

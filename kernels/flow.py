@@ -297,6 +297,18 @@ _VELOCITY: dict[type, Callable[..., Any]] = {
 _CONTAINS: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _in_box) | {OceanGrid: _in_ocean_grid}
 
 
+def _box_in_box(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+    across = flow.x_lo <= x_lo and x_hi <= flow.x_hi and flow.y_lo <= y_lo and y_hi <= flow.y_hi
+    return across and flow.t_lo <= t_lo and t_hi <= flow.t_hi
+
+
+def _unsure(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+    return False
+
+
+_CONTAINS_BOX: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _box_in_box) | {OceanGrid: _unsure}
+
+
 def _steady_carry(flow, z):
     return flow.max_speed * z
 
@@ -335,6 +347,18 @@ def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float,
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
     """Whether the flow is known at (x, y) [m] and time t [s]."""
     return _CONTAINS[type(flow)](flow, x, y, t)
+
+
+def contains_box(
+    flow: Flow, x_lo: float, x_hi: float, y_lo: float, y_hi: float, t_lo: float, t_hi: float
+) -> bool:
+    """Whether the flow is known to be known in a whole box [m, s]; a quick look before a close one."""
+    return _CONTAINS_BOX[type(flow)](flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
+
+
+@overload(contains_box)
+def _contains_box_in_kernels(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+    return _CONTAINS_BOX.get(getattr(flow, "instance_class", type(None)))
 
 
 @overload(velocity)

@@ -8,7 +8,7 @@ from numba import njit
 
 from .cache import entry_point
 from .flow import carry, contains, velocity
-from .terrain import allowed
+from .terrain import allowed, open_between
 
 
 class Integration(NamedTuple):
@@ -126,6 +126,8 @@ def stays_inside(flow, x, y, z, t, u, v, w, duration, dt):
 @njit
 def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
     """Whether the whole leg stays where `terrain` allows a glider to be, looked at every `spacing` [m]."""
+    if open_between(terrain, z, z + w * duration):
+        return True
     rows = trace(flow, x, y, z, t, u, v, w, duration, dt)
     for n in range(rows.shape[0] - 1):
         _, ax, ay, az = rows[n]
@@ -141,10 +143,10 @@ def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
 LANES = 16
 """Trajectories in flight together: enough to hide the latency of the grid's loads."""
 X, Y, Z, T, U, V, W, H = range(8)
-"""Rows of a lanes array (LANE_ROWS, LANES): place [m], time [s], velocity through water [m/s], step [s]."""
+"""Rows of lanes (LANE_ROWS or more, LANES): place [m], time [s], velocity through water [m/s], step [s]."""
 _U1, _V1, _U2, _V2, _U3, _V3, _XS, _YS = range(8, 16)
-LANE_ROWS = 22
-"""The rows above, the stages' own, and some for the caller."""
+LANE_ROWS = 16
+"""The rows above and the stages' own; a caller's lanes may have more."""
 
 
 @njit

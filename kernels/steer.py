@@ -1,4 +1,4 @@
-"""Steering: Broyden steps from a guess to the control that lands on a target, LANES problems at once."""
+"""Steering: Broyden steps from guesses to the controls that land on their targets, LANES problems at once."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from .control import glide_speed
-from .motion import LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
+from .motion import LANE_ROWS, LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
 
 LANDING_TOLERANCE = 0.005
 """A landing this close to its target [m] is a hit: half of what an edge may miss by."""
@@ -16,106 +16,117 @@ GIVE_UP = 5
 MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
-
-TIME, MISS_X, MISS_Y, TURN_A, TURN_H, FIRST_MISS = range(16, 22)
-"""Rows of a lanes array beyond `motion`'s own."""
+_ROWS = range(LANE_ROWS, LANE_ROWS + 25)
+START_X, START_Y, START_Z, GOAL_X, GOAL_Y, GOAL_Z, ANGLE, HEADING, TIME, MISS, STATE = _ROWS[:11]
+"""Rows of a lane beyond `motion`'s own: its ends [m], its control [rad], its time [s] and miss [m], its state."""
+X_LO, X_HI, Y_LO, Y_HI = _ROWS[11:15]
+"""The box [m] about where the steps of a lane's last flight began."""
+INVERSE = _ROWS[15]
+"""The first of four rows: d(angle, heading) / d(x, y) of the flow map near the guess, row by row."""
+_OFF_X, _OFF_Y, _TURN_A, _TURN_H, _FIRST_MISS, _ITERATION = _ROWS[19:]
+STEER_ROWS = _ROWS.stop
+IDLE, OPEN, HIT, LOST = 0.0, 1.0, 2.0, 3.0
+"""States: nothing to do; closing in; landed on the target within the horizon; it leads nowhere."""
 
 
 @njit
-def land_lanes(flow, polar, direction, origin, z_target, t, angle, heading, dt, lanes):
-    """Where LANES controls land at their target depths: into rows X, Y of `lanes`; row TIME: how long [s].
+def steering_lanes():
+    """Lanes without anything to do: (STEER_ROWS, LANES)."""
+    return np.zeros((STEER_ROWS, LANES))
 
-    `origin` (3, LANES) [m], all left at time t [s]. Steps of `dt` and a last, shorter one, as `motion.trace`.
+
+@njit
+def aim(lanes, n, x, y, z, x_q, y_q, z_q, angle, heading):
+    """Give lane n a guess of the control [rad] from (x, y, z) to q [m]; rows from INVERSE on are the caller's."""
+    lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n] = x, y, z
+    lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n] = x_q, y_q, z_q
+    lanes[ANGLE, n], lanes[HEADING, n] = angle, heading
+    lanes[STATE, n], lanes[_ITERATION, n] = OPEN, 0.0
+
+
+@njit
+def land_lanes(flow, polar, direction, t, dt, lanes):
+    """Fly the open lanes' controls to their targets' depths, all left at t [s]: landings in rows X, Y.
+
+    Steps of `dt` [s] and a last, shorter one, as `motion.trace`.
     """
     sign = 2.0 * direction - 1.0
     longest = 0.0
     for n in range(LANES):
-        speed = glide_speed(polar, direction, angle[n])
-        along = speed * math.cos(angle[n])
-        lanes[U, n] = along * math.cos(heading[n])
-        lanes[V, n] = along * math.sin(heading[n])
-        lanes[W, n] = speed * math.sin(sign * angle[n])
-        lanes[X, n], lanes[Y, n] = origin[0, n], origin[1, n]
-        lanes[TIME, n] = (z_target[n] - origin[2, n]) / lanes[W, n]
+        angle, heading = lanes[ANGLE, n], lanes[HEADING, n]
+        speed = glide_speed(polar, direction, angle)
+        along = speed * math.cos(angle)
+        lanes[U, n] = along * math.cos(heading)
+        lanes[V, n] = along * math.sin(heading)
+        lanes[W, n] = speed * math.sin(sign * angle)
+        lanes[X, n], lanes[Y, n] = lanes[START_X, n], lanes[START_Y, n]
+        lanes[X_LO, n], lanes[X_HI, n] = lanes[X, n], lanes[X, n]
+        lanes[Y_LO, n], lanes[Y_HI, n] = lanes[Y, n], lanes[Y, n]
+        flies = lanes[STATE, n] == OPEN
+        lanes[TIME, n] = (lanes[GOAL_Z, n] - lanes[START_Z, n]) / lanes[W, n] if flies else 0.0
         longest = max(longest, lanes[TIME, n])
     for step in range(math.ceil(longest / dt)):
         for n in range(LANES):
+            lanes[X_LO, n], lanes[X_HI, n] = min(lanes[X_LO, n], lanes[X, n]), max(lanes[X_HI, n], lanes[X, n])
+            lanes[Y_LO, n], lanes[Y_HI, n] = min(lanes[Y_LO, n], lanes[Y, n]), max(lanes[Y_HI, n], lanes[Y, n])
             lanes[T, n] = t + step * dt
-            lanes[Z, n] = origin[2, n] + step * dt * lanes[W, n]
+            lanes[Z, n] = lanes[START_Z, n] + step * dt * lanes[W, n]
             lanes[H, n] = min(dt, max(0.0, lanes[TIME, n] - step * dt))
         rk4_lanes(flow, lanes)
 
 
 @njit
-def steer_lanes(flow, polar, direction, origin, target, t, angle, heading, inverse, dt, horizon, found, lanes):
-    """Polish LANES guesses in place: `angle`, `heading` [rad], so that each lands on its target (3, LANES).
-
-    `inverse` (4, LANES): d(angle, heading) / d(x, y) of the flow map near each guess, row by row.
-    `found` (2, LANES): miss [m], inf where the steps did not close in or the horizon [s] is passed; time [s].
-    """
+def steer_lanes(flow, polar, direction, t, dt, horizon, lanes):
+    """One flight of the open lanes, and for those that miss a Broyden step of the control: a new STATE."""
     low, high = polar.shallowest[direction], polar.steepest[direction]
-    time, first_miss = lanes[TIME], lanes[FIRST_MISS]
-    miss_x, miss_y, da, dh = lanes[MISS_X], lanes[MISS_Y], lanes[TURN_A], lanes[TURN_H]
-    open_lanes = np.ones(LANES, np.bool_)
+    land_lanes(flow, polar, direction, t, dt, lanes)
     for n in range(LANES):
-        found[0, n] = math.inf
-    for iteration in range(MAX_ITERATIONS):
-        land_lanes(flow, polar, direction, origin, target[2], t, angle, heading, dt, lanes)
-        any_open = False
-        for n in range(LANES):
-            if not open_lanes[n]:
-                continue
-            rx = lanes[X, n] - target[0, n]
-            ry = lanes[Y, n] - target[1, n]
-            miss = math.hypot(rx, ry)
-            if miss <= LANDING_TOLERANCE or not miss < math.inf:
-                open_lanes[n] = False
-                if miss <= LANDING_TOLERANCE and time[n] <= horizon:
-                    found[0, n] = miss
-                    found[1, n] = time[n]
-                continue
-            if iteration == GIVE_UP and miss > 0.25 * first_miss[n]:
-                open_lanes[n] = False
-                continue
-            if iteration == 0:
-                first_miss[n] = miss
-            else:
-                _broyden(inverse, n, da[n], dh[n], rx - miss_x[n], ry - miss_y[n])
-            miss_x[n], miss_y[n] = rx, ry
-            step_angle = -(inverse[0, n] * rx + inverse[1, n] * ry)
-            step_heading = -(inverse[2, n] * rx + inverse[3, n] * ry)
-            longest = max(abs(step_angle), abs(step_heading))
-            if longest > MAX_TURN:
-                step_angle *= MAX_TURN / longest
-                step_heading *= MAX_TURN / longest
-            next_angle = min(max(angle[n] + step_angle, low), high)
-            da[n], dh[n] = next_angle - angle[n], step_heading
-            if not (da[n] != 0.0 or dh[n] != 0.0):
-                open_lanes[n] = False
-                continue
-            angle[n] = next_angle
-            heading[n] += step_heading
-            any_open = True
-        if not any_open:
-            break
-    for n in range(LANES):
-        heading[n] = math.atan2(math.sin(heading[n]), math.cos(heading[n]))
+        if lanes[STATE, n] != OPEN:
+            continue
+        off_x, off_y = lanes[X, n] - lanes[GOAL_X, n], lanes[Y, n] - lanes[GOAL_Y, n]
+        miss = math.hypot(off_x, off_y)
+        lanes[MISS, n] = miss
+        iteration = lanes[_ITERATION, n]
+        if miss <= LANDING_TOLERANCE:
+            lanes[STATE, n] = HIT if lanes[TIME, n] <= horizon else LOST
+            lanes[HEADING, n] = math.atan2(math.sin(lanes[HEADING, n]), math.cos(lanes[HEADING, n]))
+            continue
+        astray = iteration == GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
+        if astray or iteration == MAX_ITERATIONS - 1 or not miss < math.inf:
+            lanes[STATE, n] = LOST
+            continue
+        if iteration == 0:
+            lanes[_FIRST_MISS, n] = miss
+        else:
+            _broyden(lanes, n, off_x - lanes[_OFF_X, n], off_y - lanes[_OFF_Y, n])
+        lanes[_OFF_X, n], lanes[_OFF_Y, n] = off_x, off_y
+        turn_a = -(lanes[INVERSE, n] * off_x + lanes[INVERSE + 1, n] * off_y)
+        turn_h = -(lanes[INVERSE + 2, n] * off_x + lanes[INVERSE + 3, n] * off_y)
+        shorten = min(1.0, MAX_TURN / max(abs(turn_a), abs(turn_h), MAX_TURN))
+        angle = min(max(lanes[ANGLE, n] + shorten * turn_a, low), high)
+        lanes[_TURN_A, n], lanes[_TURN_H, n] = angle - lanes[ANGLE, n], shorten * turn_h
+        lanes[ANGLE, n] = angle
+        lanes[HEADING, n] += shorten * turn_h
+        lanes[_ITERATION, n] += 1.0
+        if not (lanes[_TURN_A, n] != 0.0 or lanes[_TURN_H, n] != 0.0):
+            lanes[STATE, n] = LOST
 
 
 @njit(inline="always")
-def _broyden(inverse, n, da, dh, dx, dy):
-    """Broyden's update of the inverse Jacobian (Sherman-Morrison): it now maps (dx, dy) to (da, dh)."""
-    ja = inverse[0, n] * dx + inverse[1, n] * dy
-    jh = inverse[2, n] * dx + inverse[3, n] * dy
+def _broyden(lanes, n, dx, dy):
+    """Broyden's update of the inverse Jacobian (Sherman-Morrison): it now maps (dx, dy) to the last turn."""
+    da, dh = lanes[_TURN_A, n], lanes[_TURN_H, n]
+    ja = lanes[INVERSE, n] * dx + lanes[INVERSE + 1, n] * dy
+    jh = lanes[INVERSE + 2, n] * dx + lanes[INVERSE + 3, n] * dy
     # row vector s^T J^-1
-    rx = da * inverse[0, n] + dh * inverse[2, n]
-    ry = da * inverse[1, n] + dh * inverse[3, n]
+    rx = da * lanes[INVERSE, n] + dh * lanes[INVERSE + 2, n]
+    ry = da * lanes[INVERSE + 1, n] + dh * lanes[INVERSE + 3, n]
     scale = da * ja + dh * jh
     if abs(scale) < 1e-30:
         return
     ea = (da - ja) / scale
     eh = (dh - jh) / scale
-    inverse[0, n] += ea * rx
-    inverse[1, n] += ea * ry
-    inverse[2, n] += eh * rx
-    inverse[3, n] += eh * ry
+    lanes[INVERSE, n] += ea * rx
+    lanes[INVERSE + 1, n] += ea * ry
+    lanes[INVERSE + 2, n] += eh * rx
+    lanes[INVERSE + 3, n] += eh * ry

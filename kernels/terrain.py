@@ -56,3 +56,24 @@ def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
 @overload(allowed)
 def _allowed_in_kernels(terrain, x, y, z):
     return _ALLOWED.get(getattr(terrain, "instance_class", type(None)))
+
+
+def _open_between(terrain, z, z_end):
+    return min(z, z_end) >= terrain.floor
+
+
+def _unsure(terrain, z, z_end):
+    return False
+
+
+_OPEN_BETWEEN: dict[type, Callable[..., Any]] = {OpenWater: _open_between, Seabed: _unsure}
+
+
+def open_between(terrain: Terrain, z: float, z_end: float) -> bool:
+    """Whether all water between two heights [m] is known to be allowed; a quick look before a close one."""
+    return _OPEN_BETWEEN[type(terrain)](terrain, z, z_end)
+
+
+@overload(open_between)
+def _open_between_in_kernels(terrain, z, z_end):
+    return _OPEN_BETWEEN.get(getattr(terrain, "instance_class", type(None)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.edges import IntegrationSettings, StreamlineMethod, SurfaceMethod, count_statuses, threads
+from glider_stream.edges import IntegrationSettings, StreamlineMethod, SurfaceMethod, count_statuses
 from glider_stream.errors import InputError
 from glider_stream.flow import Uniform, Vortex, Vortices, sample_flow
 from glider_stream.kernels.control import (
@@ -19,7 +19,7 @@ from glider_stream.kernels.control import (
     heading_on_line,
     horizontal_speed,
 )
-from glider_stream.kernels.edges import Status, connect_all
+from glider_stream.kernels.edges import Status, connect_nodes
 from glider_stream.kernels.flow import velocity
 from glider_stream.kernels.motion import traced
 from glider_stream.kernels.terrain import Seabed, allowed
@@ -27,6 +27,7 @@ from glider_stream.neighbours import Nearest
 from glider_stream.query import Planner
 from glider_stream.roadmap import EDGE_FIELDS, Problem, build_roadmap
 from glider_stream.sampling import RandomSampler
+from glider_stream.threads import threads
 
 both_methods = pytest.mark.parametrize("method", [StreamlineMethod, SurfaceMethod])
 METRES = 1e-9
@@ -369,12 +370,12 @@ def test_arrays_that_cannot_be_written_compile_nothing_new(evaluator, sampled):
     judge, position = evaluator(sampled), nodes(3, seed=9)
     asked = (position, np.zeros(3), *(np.asarray(one) for one in all_pairs(3)))
     expected = judge.connect(*asked)
-    compiled = len(connect_all.signatures)
+    compiled = len(connect_nodes.signatures)
     for array in asked:
         array.setflags(write=False)
     np.testing.assert_array_equal(judge.connect(*asked), expected)
     assert judge.connect(position[:1], 0.0, [0], [0, 0], []).shape == (0, 7)
-    assert len(connect_all.signatures) == compiled
+    assert len(connect_nodes.signatures) == compiled
 
 
 def test_two_thousand_random_pairs_have_one_status_each(evaluator, sampled):

@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.edges import FlowMapMethod, threads
+from glider_stream.edges import FlowMapMethod
 from glider_stream.flow import sample_flow
+from glider_stream.threads import threads
 
 CONNECTED, TIME, ANGLE, HEADING, SPEED, MISS = 0, 1, 3, 4, 5, 6
 
@@ -74,7 +75,8 @@ def test_limit_keeps_the_fastest(judge, position):
         for up in (False, True):
             row, short = rows[indptr[n] : indptr[n + 1]], kept[few[n] : few[n + 1]]
             row, short = (a[(a[:, 0] == CONNECTED) & ((a[:, ANGLE] > 0) == up)] for a in (row, short))
-            np.testing.assert_array_equal(np.sort(short[:, TIME]), np.sort(row[:, TIME])[:5])
+            # another fan, the same legs: they land within the same centimetre
+            np.testing.assert_allclose(np.sort(short[:, TIME]), np.sort(row[:, TIME])[:5], atol=0.05)
 
 
 def test_threads_change_no_bit(judge, position):

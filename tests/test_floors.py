@@ -13,7 +13,7 @@ FLOORS = {
     0: "kernels.cache kernels.flow kernels.cost kernels.terrain",
     1: "kernels.stream kernels.motion",
     2: "kernels.control",
-    3: "kernels.fan kernels.steer kernels.edges errors settings",
+    3: "kernels.fan kernels.steer kernels.edges kernels.reach errors settings threads",
     4: "bins glider flow domain frame ocean ocean_flow terrain",
     5: "sampling neighbours edges legs",
     6: "roadmap",

@@ -1,0 +1,46 @@
+"""Threads: kernels without the interpreter's lock, a few items at a time, whoever is free takes the next."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+import numba
+
+from .settings import require
+
+_CONFIG: Any = numba.config  # its settings are made at run time
+_COUNT: ContextVar[int | None] = ContextVar("threads", default=None)
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[int]:
+    """Run kernels on `count` threads (all cores, or NUMBA_NUM_THREADS, if None); yields the number."""
+    most = int(_CONFIG.NUMBA_NUM_THREADS)
+    fits = count is None or 1 <= count <= most
+    require(fits, f"`threads` must be from 1 to {most} on this machine; got {count}")
+    before = _COUNT.set(count or most)
+    try:
+        yield count or most
+    finally:
+        _COUNT.reset(before)
+
+
+def in_parallel(kernel: Callable[[int, int], object], count: int, at_once: int) -> None:
+    """Call `kernel(first, last)` until 0..count - 1 are done, `at_once` of them in a call.
+
+    The kernel writes to rows of its own items alone, so that neither the threads nor `at_once` change a bit.
+    """
+    workers = min(_COUNT.get() or int(_CONFIG.NUMBA_NUM_THREADS), -(-count // at_once))
+    if workers <= 1:
+        if count > 0:
+            kernel(0, count)
+        return
+    pool = ThreadPoolExecutor(workers)
+    try:
+        firsts = range(0, count, at_once)
+        for _ in pool.map(lambda first: kernel(first, min(first + at_once, count)), firsts):
+            pass
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
