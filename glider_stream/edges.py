@@ -18,7 +18,7 @@ from .threads import in_parallel
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 MAX_CANDIDATES = 1_000_000
-NODES_AT_ONCE = 4
+NODES_AT_ONCE = 16
 """Source nodes that a thread takes at once: few, since their work differs a hundredfold."""
 MOST_LEGS = 1024
 """Legs of a node for which there is room at first."""
@@ -53,11 +53,11 @@ class SurfaceMethod(StreamlineMethod):
 class FlowMapMethod:
     """Exact steering: every connection that there is, by the flow map of each source node.
 
-    `fan` = [glide angles, headings] of the fan that a node sends out; its cells are halved up to
-    `generations` times where they are bent or folded, so that little depends on either.
+    `fan` = [glide angles, headings] of the coarsest mesh over the controls of a node; its cells are halved
+    once, and up to `generations` times more where they are bent or folded, so that little depends on either.
     """
 
-    fan: tuple[int, int] = (8, 16)
+    fan: tuple[int, int] = (5, 8)
     generations: int = 3
 
     def __post_init__(self) -> None:
@@ -137,15 +137,13 @@ class Evaluator:
         if isinstance(self.steering, FlowMapMethod):
             result = self._connect_by_fan(*pairs)
         else:
-            medium = self.flow, self.terrain, self.polar, self.steering.kernel(), self.integration.kernel()
             result = np.empty((targets.size, 7))
-            in_parallel(partial(edges.connect_nodes, *medium, *pairs, result), sources.size, NODES_AT_ONCE)
+            task = partial(edges.connect_nodes, self._medium, self.steering.kernel(), *pairs, result)
+            in_parallel(task, sources.size, NODES_AT_ONCE)
         return result
 
     def _connect_by_fan(self, nodes: Array, departs: Array, sources: Index, rows: Index, targets: Index) -> Array:
-        quick = reach.quick_statuses(
-            self.flow, self.polar, self.integration.kernel(), nodes, departs, sources, rows, targets
-        )
+        quick = reach.quick_statuses(self._medium, nodes, departs, sources, rows, targets)
         result = np.full((targets.size, 7), np.nan)
         result[:, 0] = quick
         may = quick == Status.NO_HIT
@@ -159,6 +157,10 @@ class Evaluator:
         hit[hit] = have[at[hit]] == ask[hit]
         result[hit] = found[at[hit]]
         return result
+
+    @property
+    def _medium(self) -> edges.Medium:
+        return edges.Medium(self.flow, self.terrain, self.polar, self.integration.kernel())
 
     @property
     def flies_backward(self) -> bool:
@@ -201,15 +203,15 @@ class Evaluator:
         if len(position) == 0:
             return np.zeros(len(origin) + 1, np.int64), np.empty(0, np.int64), np.empty((0, 7))
         nodes, points = (np.require(a, np.float64, ["C", "W"]) for a in (position, origin))
-        medium = self.flow, self.terrain, self.polar, self.steering.kernel(), node_bins(nodes)
+        how = self._medium, self.steering.kernel(), node_bins(nodes)
         ends = nodes, points, departs, backward, indptr, target, limit
         room = 2 * limit if limit else min(len(nodes), MOST_LEGS)
         if indptr.size > 0:
             room = int(np.diff(indptr).max(initial=1))
         counts = np.zeros(len(points), np.int64)
         while True:
-            found = np.empty((len(points), room, reach.ROW))
-            task = partial(reach.reach_points, *medium, self.integration.kernel(), *ends, counts, found)
+            found = np.empty((len(points), room, reach.ROW - 1))
+            task = partial(reach.reach_points, *how, *ends, counts, found)
             in_parallel(task, len(points), NODES_AT_ONCE)
             if counts.max(initial=0) <= room:
                 break

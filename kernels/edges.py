@@ -12,13 +12,15 @@ from .control import (
     CLIMB,
     DIVE,
     NO_CONTROL,
+    Polar,
     candidate_controls,
     control_towards,
     vertical_speed,
 )
 from .cost import edge_cost
-from .flow import contains
-from .motion import arrival_window, closest_approach, is_clear
+from .flow import Flow, contains
+from .motion import Integration, arrival_window, closest_approach, is_clear
+from .terrain import Terrain
 
 
 class Status(IntEnum):
@@ -43,6 +45,15 @@ OUTSIDE_FLOW = int(Status.OUTSIDE_FLOW)
 
 CLEARANCE_SPACING = 5.0
 """How closely [m] a leg is looked at for land and seabed."""
+
+
+class Medium(NamedTuple):
+    """Everything that decides an edge but its ends and the steering: flow, terrain, glide polar, integration."""
+
+    flow: Flow
+    terrain: Terrain
+    polar: Polar
+    integration: Integration
 
 
 class Edge(NamedTuple):
@@ -76,8 +87,9 @@ def store(row, edge):
 
 
 @njit
-def quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integration):
+def quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t):
     """What can be told of a pair before any control is looked at; CONNECTED where nothing forbids it."""
+    flow, polar, integration = medium.flow, medium.polar, medium.integration
     if not (contains(flow, x_p, y_p, t) and contains(flow, x_q, y_q, t)):
         return OUTSIDE_FLOW
     if z_p == z_q:
@@ -92,10 +104,11 @@ def quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integr
 
 
 @njit
-def connect(flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q, z_q, t, controls):
+def connect(medium, steering, x_p, y_p, z_p, x_q, y_q, z_q, t, controls):
     """The cheapest leg from p, left at t [s], to q among the candidate controls (scratch: `controls`)."""
+    flow, polar, integration = medium.flow, medium.polar, medium.integration
     direction = CLIMB if z_q > z_p else DIVE
-    status = quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integration)
+    status = quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t)
     if status != CONNECTED:
         return no_edge(status)
     slowest = abs(z_q - z_p) / (integration.steps * integration.dt)
@@ -116,6 +129,7 @@ def connect(flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q
         miss, time = closest_approach(flow, x_p, y_p, z_p, t, c.u, c.v, c.w, x_q, y_q, z_q, integration)
         if miss >= integration.tolerance or (best.status == CONNECTED and edge_cost(time) >= best.cost):
             continue
+        terrain = medium.terrain
         if is_clear(flow, terrain, x_p, y_p, z_p, t, c.u, c.v, c.w, time, integration.dt, CLEARANCE_SPACING):
             best = Edge(CONNECTED, time, edge_cost(time), c.glide_angle, c.heading, c.speed, miss)
         elif best.status == NO_HIT:
@@ -124,28 +138,21 @@ def connect(flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q
 
 
 @njit
-def connect_node(flow, terrain, polar, steering, integration, position, departure, node, targets, edges):
+def connect_node(medium, steering, position, departure, node, targets, edges):
     """All targets of one source node, into rows of `edges` (targets, fields of Edge)."""
     controls = np.empty((steering.candidates, 2))
     x_p, y_p, z_p = position[node]
     for n in range(targets.size):
         x_q, y_q, z_q = position[targets[n]]
-        edge = connect(
-            flow, terrain, polar, steering, integration, x_p, y_p, z_p, x_q, y_q, z_q, departure[node], controls
-        )
-        store(edges[n], edge)
+        store(edges[n], connect(medium, steering, x_p, y_p, z_p, x_q, y_q, z_q, departure[node], controls))
 
 
 @entry_point(nogil=True)
-def connect_nodes(
-    flow, terrain, polar, steering, integration, position, departure, source, indptr, target, edges, first, last
-):  # fmt: skip
+def connect_nodes(medium, steering, position, departure, source, indptr, target, edges, first, last):
     """All targets of source[first:last], CSR by source in `indptr` (n + 1,) and `target` (pairs,).
 
     `position` (nodes, 3) [m], `departure` (nodes,) [s]; outcomes into `edges` (pairs, fields of Edge).
     """
     for n in range(first, last):
         row = slice(indptr[n], indptr[n + 1])
-        connect_node(
-            flow, terrain, polar, steering, integration, position, departure, source[n], target[row], edges[row]
-        )
+        connect_node(medium, steering, position, departure, source[n], target[row], edges[row])

@@ -2,7 +2,7 @@
 
 All controls of a node that share a glide angle and differ in heading land, at a given depth, on a closed
 curve; together they cover the node's footprint there. The fan is a mesh over (glide angle, heading); where a
-cell's image holds a target, the inverse of the cell's linear map is a first guess of the control.
+cell's image holds a target, the inverse of the cell's quadratic map is a first guess of the control.
 """
 
 import math
@@ -13,23 +13,29 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .control import angle_of_vertical_speed, glide_speed, vertical_speed
+from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, place, rest
 from .flow import Array
-from .motion import LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
+from .motion import LANES, W, X, Y, Z
 
 Index = NDArray[np.int64]
 
-NODE, ANGLE, HEADING, OUTSIDE, INVERSE = range(5)
-"""Columns of a guess: node, glide angle and heading [rad], how far outside its cell, in the cell's own units,
-and from INVERSE on d(angle, heading) / d(x, y), row by row."""
-GUESS_COLUMNS = 8
-ANGLES, HEADINGS, LEVELS = 4, 6, 8
-"""Columns of a cell: its four vertices, then its two angles, its two headings, its levels as bits."""
-CELL_COLUMNS = 9
+TASK, NODE, ANGLE, HEADING, OUTSIDE, INVERSE = range(6)
+"""Columns of a guess: the task it is for, node, glide angle and heading [rad], how far outside its cell, in the
+cell's own units, and from INVERSE on d(angle, heading) / d(x, y), row by row."""
+GUESS_COLUMNS = 10
+THROUGH = 2
+"""Column of a vertex, after its angle and heading: how many levels it flies through."""
+ROW, COLUMN, SIZE, LEVELS = range(4)
+"""Columns of a cell: its first corner and its size on the lattice, its levels as bits."""
+ALONG_ANGLE, ALONG_HEADING = 4, 5
+"""Rows of a patch, after the landings of its four corners: its second derivatives, in the cell's own units."""
+_VERTEX, _LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
+FAN_ROWS = FLIGHT_ROWS + 2
 MAX_LEVELS = 32
 HORIZON_ROWS = 4
 """Levels whose shallowest possible glide is a row of the mesh."""
-BENT = 4.0
-"""A cell whose middle lies this far [m] from its linear image is refined."""
+BENT = 8.0
+"""A cell whose middle lies this far [m] from its linear image is halved."""
 MARGIN = 0.35
 """A target this far outside a triangle, in its own units, is a guess where none is inside."""
 
@@ -53,7 +59,10 @@ class NodeBins(NamedTuple):
 
 
 class FlowMap(NamedTuple):
-    """Exact steering: a fan of `angles` x `headings` controls, cells halved `generations` times at most."""
+    """Exact steering: a fan of `angles` x `headings` controls.
+
+    Its cells are halved once, and `generations` times more at most.
+    """
 
     angles: int
     headings: int
@@ -116,40 +125,47 @@ def fan_rows(steering, polar, direction, rises, horizon, rows):
 def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, last, dt, landing, lanes):
     """Fly the controls of vertices first..last - 1 from (x, y, z) at t through `levels`, into rows of `landing`.
 
-    `vertex` (n, 3): glide angle, heading, and through how many levels; `landing` (n, 2 levels): x, y at each.
+    `vertex` (n, 3): glide angle, heading, and THROUGH how many levels; `landing` (n, 2 levels): x, y at each.
     Levels against the control's direction fly it back in time, to where it would have left to land at
     (x, y, z): in a steady flow the flow map's inverse.
     """
-    for begin in range(first, last, LANES):
-        most = 0
+    following = first
+    flying = 0
+    for n in range(LANES):
+        rest(lanes, n)
+        if following < last:
+            _launch(polar, direction, x, y, z, t, levels, vertex, following, dt, lanes, n)
+            following += 1
+            flying += 1
+    while flying > 0:
+        advance(flow, lanes)
         for n in range(LANES):
-            one = min(begin + n, last - 1)
-            speed = glide_speed(polar, direction, vertex[one, 0])
-            along = speed * math.cos(vertex[one, 0])
-            lanes[U, n] = along * math.cos(vertex[one, 1])
-            lanes[V, n] = along * math.sin(vertex[one, 1])
-            lanes[W, n] = (2.0 * direction - 1.0) * speed * math.sin(vertex[one, 0])
-            lanes[X, n], lanes[Y, n], lanes[Z, n], lanes[T, n] = x, y, z, t
-            most = max(most, int(vertex[one, 2]))
-        height = z
-        for level in range(most):
-            rise = levels[level] - height
-            steps = 1
-            for n in range(LANES):
-                one = min(begin + n, last - 1)
-                # a lane beyond its own levels stands still
-                lanes[H, n] = rise / lanes[W, n] if level < vertex[one, 2] else 0.0
-                steps = max(steps, math.ceil(abs(lanes[H, n]) / dt))
-            for n in range(LANES):
-                lanes[H, n] /= steps
-            for _ in range(steps):
-                rk4_lanes(flow, lanes)
-            height = levels[level]
-            for n in range(LANES):
-                lanes[Z, n] = height
-                if begin + n < last and level < vertex[begin + n, 2]:
-                    landing[begin + n, 2 * level] = lanes[X, n]
-                    landing[begin + n, 2 * level + 1] = lanes[Y, n]
+            if lanes[LEFT, n] > 0.0:
+                continue
+            one, level = int(lanes[_VERTEX, n]), int(lanes[_LEVEL, n])
+            landing[one, 2 * level], landing[one, 2 * level + 1] = lanes[X, n], lanes[Y, n]
+            if level + 1 < vertex[one, THROUGH]:
+                lanes[Z, n] = levels[level]
+                lanes[_LEVEL, n] = level + 1
+                fly_for(lanes, n, (levels[level + 1] - levels[level]) / lanes[W, n], dt)
+            elif following < last:
+                _launch(polar, direction, x, y, z, t, levels, vertex, following, dt, lanes, n)
+                following += 1
+            else:
+                rest(lanes, n)
+                flying -= 1
+
+
+@njit
+def _launch(polar, direction, x, y, z, t, levels, vertex, one, dt, lanes, n):
+    """Send lane n off with a vertex's control, to the first level."""
+    angle, heading = vertex[one, 0], vertex[one, 1]
+    speed = glide_speed(polar, direction, angle)
+    along = speed * math.cos(angle)
+    w = (2.0 * direction - 1.0) * speed * math.sin(angle)
+    place(lanes, n, x, y, z, t, along * math.cos(heading), along * math.sin(heading), w)
+    lanes[_VERTEX, n], lanes[_LEVEL, n] = one, 0.0
+    fly_for(lanes, n, (levels[0] - z) / w, dt)
 
 
 @njit(inline="always")
@@ -187,50 +203,118 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
 
 
 @njit
-def longer(rows):
-    """The rows, and as many empty ones."""
-    grown = np.empty((2 * rows.shape[0], rows.shape[1]))
-    for n in range(rows.shape[0]):
-        for m in range(rows.shape[1]):
-            grown[n, m] = rows[n, m]
+def longer(rows, needed):
+    """The rows, and empty ones: twice as many, or as many as are needed."""
+    if needed <= rows.shape[0]:
+        return rows
+    grown = np.empty((max(2 * rows.shape[0], needed), rows.shape[1]), rows.dtype)
+    grown[: rows.shape[0]] = rows
     return grown
 
 
 @njit
-def _corners(landing, cell, level, x, y, image):
-    """Landings of the cell's corners at a level and at the one before it; the rectangle about them."""
-    for c in range(4):
-        vertex = int(cell[c])
-        for m in range(2):
-            image[0, c, m] = landing[vertex, 2 * level + m]
-            image[1, c, m] = landing[vertex, 2 * level - 2 + m] if level > 0 else (x if m == 0 else y)
+def _patch(landing, corners, i, j, level, patch):
+    """Quarter (i, j) of a cell at a level: landings of its corners, and its second derivatives.
+
+    `corners` (9,): the vertices of the cell, halved. Of second derivatives the mean of both sides.
+    """
+    for m in range(2):
+        at = 2 * level + m
+        for c in range(4):
+            patch[c, m] = landing[corners[3 * (i + c // 2) + j + c % 2], at]
+        along_angle = 0.0
+        along_heading = 0.0
+        for side in range(2):
+            a, h = j + side, 3 * (i + side)
+            ends = landing[corners[a], at] + landing[corners[a + 6], at]
+            along_angle += ends - 2.0 * landing[corners[a + 3], at]
+            ends = landing[corners[h], at] + landing[corners[h + 2], at]
+            along_heading += ends - 2.0 * landing[corners[h + 1], at]
+        patch[ALONG_ANGLE, m] = 0.5 * along_angle
+        patch[ALONG_HEADING, m] = 0.5 * along_heading
 
 
 @njit
-def _around(bins, image):
-    """The rectangle about the cell's images: x_lo, x_hi, y_lo, y_hi [m]."""
+def _around(bins, patches):
+    """The rectangle about a patch, and about its start where nodes lie between: x_lo, x_hi, y_lo, y_hi [m]."""
     x_lo, x_hi, y_lo, y_hi = math.inf, -math.inf, math.inf, -math.inf
-    for c in range(4):
-        for end in range(1 if bins.aligned else 2):
-            x_lo, x_hi = min(x_lo, image[end, c, 0]), max(x_hi, image[end, c, 0])
-            y_lo, y_hi = min(y_lo, image[end, c, 1]), max(y_hi, image[end, c, 1])
+    for end in range(1 if bins.aligned else 2):
+        for c in range(4):
+            x_lo, x_hi = min(x_lo, patches[end, c, 0]), max(x_hi, patches[end, c, 0])
+            y_lo, y_hi = min(y_lo, patches[end, c, 1]), max(y_hi, patches[end, c, 1])
     return x_lo, x_hi, y_lo, y_hi
 
 
 @njit
-def guess_in_cell(bins, layer, start, end, position, wanted, z, image, cell, guesses, count):
-    """First guesses for the wanted nodes under one cell; returns (guesses, count).
+def _bend(p):
+    """How far [m] a patch is from flat: the greatest distance of its middle lines from its linear image."""
+    x = p[0, 0] - p[1, 0] - p[2, 0] + p[3, 0]
+    y = p[0, 1] - p[1, 1] - p[2, 1] + p[3, 1]
+    twist = 0.25 * math.sqrt(x * x + y * y)
+    along_angle = math.sqrt(p[ALONG_ANGLE, 0] ** 2 + p[ALONG_ANGLE, 1] ** 2) / 8.0
+    return max(twist, along_angle, math.sqrt(p[ALONG_HEADING, 0] ** 2 + p[ALONG_HEADING, 1] ** 2) / 8.0)
 
-    `image` (3, 4, 2): landings of the controls (a0, h0), (a0, h1), (a1, h0), (a1, h1) at the layer's `end` and
-    at its `start` [m]; the third is scratch.
+
+@njit
+def _folded(p):
+    """Whether the two triangles of a patch are turned opposite ways."""
+    low = (p[2, 0] - p[0, 0]) * (p[1, 1] - p[0, 1]) - (p[1, 0] - p[0, 0]) * (p[2, 1] - p[0, 1])
+    high = (p[1, 0] - p[3, 0]) * (p[2, 1] - p[3, 1]) - (p[2, 0] - p[3, 0]) * (p[1, 1] - p[3, 1])
+    return low * high <= 0.0
+
+
+@njit
+def wants_halving(bins, layer, position, wanted, patches):
+    """Whether a patch that is bent or folded has a wanted node within the bend's or the fold's reach."""
+    bend = _bend(patches[0])
+    folded = _folded(patches[0])
+    if bend <= BENT and not folded:
+        return False
+    x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
+    room = max(bend, 0.25 * max(x_hi - x_lo, y_hi - y_lo)) if folded else bend
+    return any_wanted(bins, layer, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
+
+
+@njit
+def _solve(p, x, y, s, r):
+    """Newton steps from (s, r) towards the point of a patch's quadratic map that is (x, y).
+
+    Returns s, r and the map's derivatives x_s, x_r, y_s, y_r there; s is along the angle, r along the heading.
     """
-    corners, before, at = image[0], image[1], image[2]
-    x_lo, x_hi, y_lo, y_hi = _around(bins, image)
+    x_s, x_r, y_s, y_r = 0.0, 0.0, 0.0, 0.0
+    for step in range(3):
+        twist_x = p[3, 0] - p[2, 0] - p[1, 0] + p[0, 0]
+        twist_y = p[3, 1] - p[2, 1] - p[1, 1] + p[0, 1]
+        x_s = p[2, 0] - p[0, 0] + r * twist_x - (0.5 - s) * p[ALONG_ANGLE, 0]
+        y_s = p[2, 1] - p[0, 1] + r * twist_y - (0.5 - s) * p[ALONG_ANGLE, 1]
+        x_r = p[1, 0] - p[0, 0] + s * twist_x - (0.5 - r) * p[ALONG_HEADING, 0]
+        y_r = p[1, 1] - p[0, 1] + s * twist_y - (0.5 - r) * p[ALONG_HEADING, 1]
+        det = x_s * y_r - x_r * y_s
+        if step == 2 or det == 0.0:
+            break
+        a, h = 0.5 * s * (1.0 - s), 0.5 * r * (1.0 - r)
+        off_x = p[0, 0] + s * (p[2, 0] - p[0, 0]) + r * (p[1, 0] - p[0, 0]) + s * r * twist_x - x
+        off_y = p[0, 1] + s * (p[2, 1] - p[0, 1]) + r * (p[1, 1] - p[0, 1]) + s * r * twist_y - y
+        off_x -= a * p[ALONG_ANGLE, 0] + h * p[ALONG_HEADING, 0]
+        off_y -= a * p[ALONG_ANGLE, 1] + h * p[ALONG_HEADING, 1]
+        s -= (y_r * off_x - x_r * off_y) / det
+        r -= (x_s * off_y - y_s * off_x) / det
+    return s, r, x_s, x_r, y_s, y_r
+
+
+@njit
+def guess_in_patch(
+    bins, layer, start, end, position, wanted, z, patches, task, angle, da, heading, dh, guesses, count
+):
+    """First guesses for the wanted nodes under a patch of (angle, heading) + (da, dh); returns (guesses, count).
+
+    `patches` (3, 6, 2): the patch at the layer's `end` and at its `start` [m]; the third is scratch.
+    """
+    x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
     room = MARGIN * max(x_hi - x_lo, y_hi - y_lo)
     i_first, i_last = _bin_range(x_lo - room, x_hi + room, bins.x_lo, bins.per_bin, bins.nx)
     j_first, j_last = _bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
-    da = cell[ANGLES + 1] - cell[ANGLES]
-    dh = cell[HEADINGS + 1] - cell[HEADINGS]
+    p = patches[0] if bins.aligned else patches[2]
     for i in range(i_first, i_last + 1):
         row = (layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
@@ -241,78 +325,49 @@ def guess_in_cell(bins, layer, start, end, position, wanted, z, image, cell, gue
             f = (position[node, 2] - start) / (end - start)
             if position[node, 2] == z or f < 0.0 or f > 1.0 or not (wanted.size == 0 or wanted[node]):
                 continue
-            for c in range(4):
-                for m in range(2):
-                    at[c, m] = before[c, m] + f * (corners[c, m] - before[c, m])
-            best = math.inf
-            for upper in range(2):
-                # lower triangle at (a0, h0), upper one at (a1, h1), their legs along angle and heading
-                o = 3 * upper
-                p = 2 - upper
-                q = 1 + upper
-                s, r, det = _inside(at[o, 0], at[o, 1], at[p, 0], at[p, 1], at[q, 0], at[q, 1], x, y)
-                outside = max(0.0, -s, -r, s + r - 1.0)
-                if det == 0.0 or outside > MARGIN or outside >= best:
-                    continue
-                if best == math.inf:
-                    if count == guesses.shape[0]:
-                        guesses = longer(guesses)
-                    count += 1
-                best = outside
-                # the triangle's own legs are -da, -dh long in the upper one
-                sign = 1.0 - 2.0 * upper
-                ga = sign * da / det
-                gh = sign * dh / det
-                guess = guesses[count - 1]
-                guess[NODE] = node
-                guess[ANGLE] = cell[ANGLES + upper] + sign * s * da
-                guess[HEADING] = cell[HEADINGS + upper] + sign * r * dh
-                guess[OUTSIDE] = outside
-                guess[INVERSE] = ga * (at[q, 1] - at[o, 1])
-                guess[INVERSE + 1] = -ga * (at[q, 0] - at[o, 0])
-                guess[INVERSE + 2] = -gh * (at[p, 1] - at[o, 1])
-                guess[INVERSE + 3] = gh * (at[p, 0] - at[o, 0])
+            if not bins.aligned:
+                for c in range(6):
+                    for m in range(2):
+                        p[c, m] = patches[1, c, m] + f * (patches[0, c, m] - patches[1, c, m])
+            # lower triangle at corner 0, upper one at corner 3, their legs along angle and heading
+            s, r, low = _inside(p[0, 0], p[0, 1], p[2, 0], p[2, 1], p[1, 0], p[1, 1], x, y)
+            outside = max(0.0, -s, -r, s + r - 1.0) if low != 0.0 else math.inf
+            back_s, back_r, high = _inside(p[3, 0], p[3, 1], p[1, 0], p[1, 1], p[2, 0], p[2, 1], x, y)
+            beyond = max(0.0, -back_s, -back_r, back_s + back_r - 1.0) if high != 0.0 else math.inf
+            if beyond < outside:
+                s, r, outside = 1.0 - back_s, 1.0 - back_r, beyond
+            if outside > MARGIN:
+                continue
+            s_2, r_2, x_s, x_r, y_s, y_r = _solve(p, x, y, s, r)
+            if abs(s_2 - s) + abs(r_2 - r) < 1.0:
+                s, r = s_2, r_2
+            else:
+                x_s, x_r, y_s, y_r = p[2, 0] - p[0, 0], p[1, 0] - p[0, 0], p[2, 1] - p[0, 1], p[1, 1] - p[0, 1]
+            det = x_s * y_r - x_r * y_s
+            if det == 0.0:
+                continue
+            guesses = longer(guesses, count + 1)
+            guess = guesses[count]
+            guess[TASK], guess[NODE], guess[OUTSIDE] = task, node, outside
+            guess[ANGLE], guess[HEADING] = angle + s * da, heading + r * dh
+            guess[INVERSE], guess[INVERSE + 1] = da * y_r / det, -da * x_r / det
+            guess[INVERSE + 2], guess[INVERSE + 3] = -dh * y_s / det, dh * x_s / det
+            count += 1
     return guesses, count
-
-
-@njit(inline="always")
-def _bend(landing, a, b, middle, level):
-    """How far [m] a landing lies from the middle of two others."""
-    x = landing[middle, 2 * level] - 0.5 * (landing[a, 2 * level] + landing[b, 2 * level])
-    y = landing[middle, 2 * level + 1] - 0.5 * (landing[a, 2 * level + 1] + landing[b, 2 * level + 1])
-    return math.sqrt(x * x + y * y)
-
-
-@njit
-def _folded(c):
-    """Whether the two triangles of a cell are turned opposite ways."""
-    low = (c[2, 0] - c[0, 0]) * (c[1, 1] - c[0, 1]) - (c[1, 0] - c[0, 0]) * (c[2, 1] - c[0, 1])
-    high = (c[1, 0] - c[3, 0]) * (c[2, 1] - c[3, 1]) - (c[2, 0] - c[3, 0]) * (c[1, 1] - c[3, 1])
-    return low * high <= 0.0
-
-
-@njit
-def wants_halving(bins, layer, position, wanted, image, bend):
-    """Whether a cell bent by `bend` [m], or folded, has a wanted node within the bend or the fold's reach."""
-    folded = _folded(image[0])
-    if bend <= BENT and not folded:
-        return False
-    x_lo, x_hi, y_lo, y_hi = _around(bins, image)
-    room = max(bend, 0.25 * max(x_hi - x_lo, y_hi - y_lo)) if folded else bend
-    return any_wanted(bins, layer, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
 
 
 @njit
 def fan_guesses(
-    flow, polar, steering, bins, position, wanted, direction, backward, x, y, z, t, deepest, dt, horizon, lanes
+    medium, steering, bins, position, wanted, task, direction, backward, x, y, z, t, deepest, horizon, dt,
+    guesses, count, lanes,
 ):  # fmt: skip
     """First guesses for the wanted nodes that (x, y, z) may reach within `horizon` [s], one vertical direction.
 
     `wanted` (nodes,), all where it is empty; none lies further than `deepest` [m]. With `backward`, those
-    that may reach it, and the controls that they would take. Returns (guesses, count).
+    that may reach it, and the controls that they would take. They follow the `count` guesses that are there;
+    returns (guesses, count).
     """
-    guesses = np.empty((256, GUESS_COLUMNS))
-    count = np.int64(0)  # not a literal: what takes it is compiled once
+    flow, polar = medium.flow, medium.polar
     levels = np.empty(MAX_LEVELS)
     layers = np.empty(MAX_LEVELS, np.int64)
     outward = 1 - direction if backward else direction
@@ -331,158 +386,94 @@ def fan_guesses(
     row_count = fan_rows(steering, polar, direction, rises, horizon, rows)
     if row_count == 0:
         return guesses, count
-    columns = steering.headings
-    vertices = row_count * columns
-    vertex = np.empty((4 * vertices, 3))
-    landing = np.empty((4 * vertices, 2 * reached))
-    for i in range(row_count):
+
+    # the finest mesh there may be, as a lattice: which vertex lies where, -1 where none does
+    unit = 2 << steering.generations
+    lattice = np.full(((row_count - 1) * unit + 1, steering.headings * unit), -1, np.int32)
+    turn = 2.0 * math.pi / lattice.shape[1]
+    cells = np.empty((row_count * steering.headings, 4), np.int64)
+    waiting = 0
+    for i in range(row_count - 1):
         furthest = vertical_speed(polar, direction, rows[i]) * horizon * (1.0 + 1e-9)
         through = 0
         while through < reached and abs(levels[through] - z) <= furthest:
             through += 1
-        for j in range(columns):
-            vertex[i * columns + j, 0] = rows[i]
-            vertex[i * columns + j, 1] = 2.0 * math.pi * j / columns
+        if not bins.aligned:
             # nodes between levels: one more, to interpolate
-            vertex[i * columns + j, 2] = through if bins.aligned else min(through + 1, reached)
-    first = np.int64(0)
-    land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, vertices, dt, landing, lanes)
-
-    image = np.empty((3, 4, 2))
-    cell = np.empty(CELL_COLUMNS)
-    cells = np.empty((256, CELL_COLUMNS))
-    waiting = 0
-    for i in range(row_count - 1):
-        for j in range(columns):
-            base_cell(rows, columns, i, j, cell)
-            bits = 0
-            for k in range(int(min(vertex[i * columns, 2], vertex[(i + 1) * columns, 2]))):
-                _corners(landing, cell, k, x, y, image)
-                bend = base_bend(landing, vertex, rows, row_count, columns, i, j, k)
-                if steering.generations > 0 and wants_halving(bins, layers[k], position, wanted, image, bend):
-                    bits |= 1 << k
-                else:
-                    start = levels[k - 1] if k > 0 else z
-                    guesses, count = guess_in_cell(
-                        bins, layers[k], start, levels[k], position, wanted, z, image, cell, guesses, count
-                    )
-            if bits:
-                if waiting == cells.shape[0]:
-                    cells = longer(cells)
-                cell[LEVELS] = bits
-                cells[waiting] = cell
-                waiting += 1
-    generation = 0
+            through = min(through + 1, reached)
+        for j in range(steering.headings):
+            cell = cells[waiting]
+            cell[ROW], cell[COLUMN], cell[SIZE], cell[LEVELS] = i * unit, j * unit, unit, (1 << through) - 1
+            waiting += 1
+    vertex = np.empty((512, 3))
+    landing = np.empty((512, 2 * reached))
+    corners = np.empty(9, np.int64)
+    patches = np.empty((3, 6, 2))
+    vertices = 0
     done = 0
+    generation = 0
     while done < waiting:
-        generation += 1
+        # halve the cells that wait: their vertices, where they are not there
         last = waiting
-        while vertices + 5 * (last - done) > vertex.shape[0]:
-            vertex, landing = longer(vertex), longer(landing)
+        new = vertices
         for c in range(done, last):
-            middles(cells[c], vertex, vertices + 5 * (c - done))
-        new = vertices + 5 * (last - done)
-        land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, vertices, new, dt, landing, lanes)
+            half = cells[c, SIZE] // 2
+            top = 0
+            while (cells[c, LEVELS] >> top) > 0:
+                top += 1
+            vertex, landing = longer(vertex, vertices + 9), longer(landing, vertices + 9)
+            for corner in range(9):
+                i = cells[c, ROW] + corner // 3 * half
+                j = (cells[c, COLUMN] + corner % 3 * half) % lattice.shape[1]
+                one = lattice[i, j]
+                if one < 0:
+                    lattice[i, j] = vertices
+                    row = min(i // unit, row_count - 2)
+                    share = i / unit - row
+                    vertex[vertices, 0] = (1.0 - share) * rows[row] + share * rows[row + 1]
+                    vertex[vertices, 1] = j * turn
+                    vertex[vertices, THROUGH] = top
+                    vertices += 1
+                elif one >= new:
+                    vertex[one, THROUGH] = max(vertex[one, THROUGH], top)
+        land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, new, vertices, dt, landing, lanes)
+        # their quarters wait for another generation, or are looked into
         for c in range(done, last):
-            mid = vertices + 5 * (c - done)
-            bits = int(cells[c, LEVELS])
-            for child in range(4):
-                quarter(cells[c], mid, child, cell)
-                left = 0
+            half = cells[c, SIZE] // 2
+            for corner in range(9):
+                j = (cells[c, COLUMN] + corner % 3 * half) % lattice.shape[1]
+                corners[corner] = lattice[cells[c, ROW] + corner // 3 * half, j]
+            for quarter in range(4):
+                low, left_of = quarter // 2, quarter % 2
+                still = 0
+                angle = vertex[corners[3 * low], 0]
+                da = vertex[corners[3 * low + 3], 0] - angle
                 for k in range(reached):
-                    if not (bits >> k) & 1:
+                    if not (cells[c, LEVELS] >> k) & 1:
                         continue
-                    _corners(landing, cell, k, x, y, image)
-                    # halving a cell quarters its bend
-                    bend = 0.25 * bend_of(landing, cells[c], mid, k)
+                    _patch(landing, corners, low, left_of, k, patches[0])
+                    if not bins.aligned:
+                        if k > 0:
+                            _patch(landing, corners, low, left_of, k - 1, patches[1])
+                        else:
+                            patches[1, :, 0], patches[1, :, 1] = x, y
+                            patches[1, 4:] = 0.0
                     if generation < steering.generations and wants_halving(
-                        bins, layers[k], position, wanted, image, bend
+                        bins, layers[k], position, wanted, patches
                     ):
-                        left |= 1 << k
-                    else:
-                        start = levels[k - 1] if k > 0 else z
-                        guesses, count = guess_in_cell(
-                            bins, layers[k], start, levels[k], position, wanted, z, image, cell, guesses, count
-                        )
-                if left:
-                    if waiting == cells.shape[0]:
-                        cells = longer(cells)
-                    cell[LEVELS] = left
-                    cells[waiting] = cell
+                        still |= 1 << k
+                        continue
+                    start = levels[k - 1] if k > 0 else z
+                    guesses, count = guess_in_patch(
+                        bins, layers[k], start, levels[k], position, wanted, z, patches, task, angle, da,
+                        (cells[c, COLUMN] + left_of * half) * turn, half * turn, guesses, count,
+                    )  # fmt: skip
+                if still:
+                    cells = longer(cells, waiting + 1)
+                    cell = cells[waiting]
+                    cell[ROW], cell[COLUMN] = cells[c, ROW] + low * half, cells[c, COLUMN] + left_of * half
+                    cell[SIZE], cell[LEVELS] = half, still
                     waiting += 1
-        vertices = new
         done = last
+        generation += 1
     return guesses, count
-
-
-@njit
-def base_cell(rows, columns, i, j, cell):
-    """Cell (i, j) of the base mesh, between rows i, i + 1 and columns j, j + 1."""
-    right = (j + 1) % columns
-    cell[0], cell[1] = i * columns + j, i * columns + right
-    cell[2], cell[3] = cell[0] + columns, cell[1] + columns
-    cell[ANGLES], cell[ANGLES + 1] = rows[i], rows[i + 1]
-    cell[HEADINGS], cell[HEADINGS + 1] = 2.0 * math.pi * j / columns, 2.0 * math.pi * (j + 1) / columns
-
-
-@njit
-def base_bend(landing, vertex, rows, row_count, columns, i, j, k):
-    """The bend [m] of a base cell, from second differences along its sides and its twist."""
-    bend = 0.0
-    step = rows[i + 1] - rows[i]
-    for row in (i, i + 1):
-        for side in (j, (j + 1) % columns):
-            here = row * columns + side
-            before, after = row * columns + (side - 1) % columns, row * columns + (side + 1) % columns
-            bend = max(bend, 0.25 * _bend(landing, before, after, here, k))
-            up, down = here + columns, here - columns
-            if 0 < row < row_count - 1 and k < vertex[down, 2]:
-                # rows are uneven: the second derivative times half a step squared, over two
-                low, high = rows[row] - rows[row - 1], rows[row + 1] - rows[row]
-                x = (landing[up, 2 * k] - landing[here, 2 * k]) / high
-                x -= (landing[here, 2 * k] - landing[down, 2 * k]) / low
-                y = (landing[up, 2 * k + 1] - landing[here, 2 * k + 1]) / high
-                y -= (landing[here, 2 * k + 1] - landing[down, 2 * k + 1]) / low
-                bend = max(bend, math.sqrt(x * x + y * y) / (low + high) * step * step / 4.0)
-    a, b = i * columns + j, i * columns + (j + 1) % columns
-    c, d = a + columns, b + columns
-    x = landing[a, 2 * k] - landing[b, 2 * k] - landing[c, 2 * k] + landing[d, 2 * k]
-    y = landing[a, 2 * k + 1] - landing[b, 2 * k + 1] - landing[c, 2 * k + 1] + landing[d, 2 * k + 1]
-    return max(bend, 0.25 * math.hypot(x, y))
-
-
-@njit
-def middles(cell, vertex, mid):
-    """Controls that halve a cell, into vertices from `mid`: (a0, hm), (am, h0), (am, hm), (am, h1), (a1, hm)."""
-    through = 0
-    while (int(cell[LEVELS]) >> through) > 0:
-        through += 1
-    for m in range(5):
-        a = 0.0 if m == 0 else (1.0 if m == 4 else 0.5)
-        h = 0.0 if m == 1 else (1.0 if m == 3 else 0.5)
-        vertex[mid + m, 0] = (1.0 - a) * cell[ANGLES] + a * cell[ANGLES + 1]
-        vertex[mid + m, 1] = (1.0 - h) * cell[HEADINGS] + h * cell[HEADINGS + 1]
-        vertex[mid + m, 2] = through
-
-
-@njit
-def bend_of(landing, cell, mid, k):
-    """The bend [m] of a cell whose middles are landed: along its sides and both diagonals."""
-    a, b, c, d = int(cell[0]), int(cell[1]), int(cell[2]), int(cell[3])
-    sides = max(_bend(landing, a, b, mid, k), _bend(landing, a, c, mid + 1, k))
-    sides = max(sides, _bend(landing, b, d, mid + 3, k), _bend(landing, c, d, mid + 4, k))
-    return max(sides, _bend(landing, a, d, mid + 2, k), _bend(landing, b, c, mid + 2, k))
-
-
-@njit
-def quarter(parent, mid, child, cell):
-    """Quarter `child` of a cell: 0 to 3, in the order of its corners."""
-    for c in range(4):
-        # rows and columns of the parent's 3 x 3 vertices, whose corners are its own and the rest its middles
-        i, j = child // 2 + c // 2, child % 2 + c % 2
-        corner = i % 2 == 0 and j % 2 == 0
-        cell[c] = parent[i + j // 2] if corner else mid + 2 * i + j - 1
-    for m in range(2):
-        i, j = child // 2 + m, child % 2 + m
-        cell[ANGLES + m] = (1.0 - 0.5 * i) * parent[ANGLES] + 0.5 * i * parent[ANGLES + 1]
-        cell[HEADINGS + m] = (1.0 - 0.5 * j) * parent[HEADINGS] + 0.5 * j * parent[HEADINGS + 1]

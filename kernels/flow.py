@@ -16,6 +16,10 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from .cache import entry_point
+from .interpolate import pair_between
+
+JUST_BELOW = 1.0 - 2.0**-52
+"""The last point of a grid belongs to the cell below it, but for this."""
 
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
@@ -210,25 +214,10 @@ def _cell(at, count):
     """The cell below a fractional index, held within the grid, and the weight of its upper end."""
     # NaN (a step that left the grid) must not become an address: the comparisons send it to 0
     held = at if at > 0.0 else 0.0
-    top = count - 1.0
-    held = held if held < top else top
-    below = min(np.intp(held), np.intp(count) - 2)
+    last = (count - 1.0) * JUST_BELOW
+    held = held if held < last else last
+    below = np.intp(held)
     return np.uintp(below), held - below
-
-
-@njit(inline="always")
-def _bilinear(plane, i, j, a, b, m):
-    one = np.uintp(1)
-    low = plane[i, j, m] + b * (plane[i, j + one, m] - plane[i, j, m])
-    high = plane[i + one, j, m] + b * (plane[i + one, j + one, m] - plane[i + one, j, m])
-    return low + a * (high - low)
-
-
-@njit(inline="always")
-def _trilinear(values, i, j, k, a, b, c, m):
-    low = _bilinear(values[k], i, j, a, b, m)
-    high = _bilinear(values[k + np.uintp(1)], i, j, a, b, m)
-    return low + c * (high - low)
 
 
 @njit(inline="always")
@@ -249,7 +238,7 @@ def _grid(flow, x, y, z, t):
     k, c = _cell((z - flow.z_first) * flow.per_z, values.shape[0])
     i, a = _cell((x - flow.x_lo) * flow.per_x, values.shape[1])
     j, b = _cell((y - flow.y_lo) * flow.per_y, values.shape[2])
-    return _trilinear(values, i, j, k, a, b, c, 0), _trilinear(values, i, j, k, a, b, c, 1)
+    return pair_between(values, (k, i, j), (c, a, b))
 
 
 @njit(inline="always")
@@ -257,7 +246,7 @@ def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
     """Fractional grid indices (i, j) at (x, y) [m], from a map as `OceanGrid` describes it."""
     p, a = _cell((x - x_lo) * per_x, index_map.shape[0])
     q, b = _cell((y - y_lo) * per_y, index_map.shape[1])
-    return _bilinear(index_map, p, q, a, b, 0), _bilinear(index_map, p, q, a, b, 1)
+    return pair_between(index_map, (p, q), (a, b))
 
 
 def _ocean_grid(flow, x, y, z, t):
@@ -267,12 +256,7 @@ def _ocean_grid(flow, x, y, z, t):
     j, b = _cell(at_j, values.shape[3])
     k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
     n, d = _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
-    before, after = values[n], values[n + np.uintp(1)]
-    u = _trilinear(before, i, j, k, a, b, c, 0)
-    v = _trilinear(before, i, j, k, a, b, c, 1)
-    u += d * (_trilinear(after, i, j, k, a, b, c, 0) - u)
-    v += d * (_trilinear(after, i, j, k, a, b, c, 1) - v)
-    return u, v
+    return pair_between(values, (n, k, i, j), (d, c, a, b))
 
 
 def _in_box(flow, x, y, t):

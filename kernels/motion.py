@@ -140,7 +140,7 @@ def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
     return True
 
 
-LANES = 16
+LANES = 32
 """Trajectories in flight together: enough to hide the latency of the grid's loads."""
 X, Y, Z, T, U, V, W, H = range(8)
 """Rows of lanes (LANE_ROWS or more, LANES): place [m], time [s], velocity through water [m/s], step [s]."""

@@ -1,4 +1,4 @@
-"""Reach: the exact legs between a point and the nodes under its fan; guesses polished, the cheapest kept."""
+"""Reach: the exact legs between points and the nodes under their fans; guesses polished, the cheapest kept."""
 
 import math
 
@@ -10,10 +10,11 @@ from .cache import entry_point
 from .control import CLIMB, angle_of_vertical_speed, control_towards, horizontal_speed, vertical_speed
 from .cost import edge_cost
 from .edges import BLOCKED, CLEARANCE_SPACING, CONNECTED, NO_HIT, Edge, no_edge, quick_status, store
-from .fan import ANGLE, HEADING, INVERSE, NODE, OUTSIDE, fan_guesses
+from .fan import ANGLE, FAN_ROWS, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, fan_guesses
+from .flight import LEFT, advance, hangar
 from .flow import contains, contains_box
 from .motion import LANES, is_clear, stays_inside
-from .steer import HIT, IDLE, OPEN, STATE, TIME, aim, steer_lanes, steering_lanes
+from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct, widen
 
 MAX_TRIES = 12
 """Guesses that are polished for one node."""
@@ -21,8 +22,10 @@ FAN_STEP = 3.0
 """Steps of a fan, in steps of a leg: it gives first guesses."""
 INSIDE = 1e-9
 """A guess this little outside its triangle is inside."""
-ROW = 8
-"""A row of what is found: the node, then the fields of Edge."""
+ORIGIN, DIRECTION, DEADLINE, DONE = range(4)
+"""Columns of a task: the point it is for, its direction, by when its legs arrive [s], whether it is done."""
+ROW = 9
+"""A row of what is polished: the task, the node, the fields of Edge. What is found lacks the task."""
 
 
 @njit
@@ -32,107 +35,119 @@ def ranks(keys):
 
 
 @njit
-def checked_leg(flow, terrain, polar, integration, direction, x, y, z, x_q, y_q, z_q, t, lanes, n):
+def checked_leg(medium, lanes, n):
     """The leg that lane n has found, if it stays where the flow is known and where the terrain allows."""
-    c = control_towards(polar, direction, lanes[steer.ANGLE, n], lanes[steer.HEADING, n])
-    time = lanes[TIME, n]
-    if not (contains(flow, x, y, t) and contains(flow, x_q, y_q, t)):
+    flow, dt = medium.flow, medium.integration.dt
+    direction = int(lanes[steer.DIRECTION, n])
+    c = control_towards(medium.polar, direction, lanes[steer.ANGLE, n], lanes[steer.HEADING, n])
+    x, y, z = lanes[steer.START_X, n], lanes[steer.START_Y, n], lanes[steer.START_Z, n]
+    t, time = lanes[steer.START_T, n], lanes[TIME, n]
+    if not (contains(flow, x, y, t) and contains(flow, lanes[steer.GOAL_X, n], lanes[steer.GOAL_Y, n], t)):
         return no_edge(NO_HIT)
     x_lo, x_hi = lanes[steer.X_LO, n], lanes[steer.X_HI, n]
     y_lo, y_hi = lanes[steer.Y_LO, n], lanes[steer.Y_HI, n]
     inside = contains_box(flow, x_lo, x_hi, y_lo, y_hi, t, t + time)
-    if not inside and not stays_inside(flow, x, y, z, t, c.u, c.v, c.w, time, integration.dt):
+    if not inside and not stays_inside(flow, x, y, z, t, c.u, c.v, c.w, time, dt):
         return no_edge(NO_HIT)
-    if not is_clear(flow, terrain, x, y, z, t, c.u, c.v, c.w, time, integration.dt, CLEARANCE_SPACING):
+    if not is_clear(flow, medium.terrain, x, y, z, t, c.u, c.v, c.w, time, dt, CLEARANCE_SPACING):
         return no_edge(BLOCKED)
     return Edge(CONNECTED, time, edge_cost(time), c.glide_angle, c.heading, c.speed, lanes[steer.MISS, n])
 
 
 @njit
-def polish(
-    flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, count, horizon, lanes
-):  # fmt: skip
-    """The cheapest exact leg for each node among first guesses, between it and (x, y, z): rows (nodes, ROW).
+def polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes):
+    """The cheapest exact leg between each task's point and each node among first guesses: rows (pairs, ROW).
 
     Of a node's guesses those inside a cell go first, earliest first, then those outside, nearest first. A lane
     whose guess is settled takes the next one, so that all are always busy; none knows of the others.
     """
+    nodes = position.shape[0]
     key = np.empty(count)
     time = np.empty(count)
     for n in range(count):
-        rise = abs(position[int(guesses[n, NODE]), 2] - z)
-        time[n] = rise / vertical_speed(polar, direction, guesses[n, ANGLE])
+        task = tasks[int(guesses[n, TASK])]
+        rise = abs(position[int(guesses[n, NODE]), 2] - origin[int(task[ORIGIN]), 2])
+        time[n] = rise / vertical_speed(medium.polar, int(task[DIRECTION]), guesses[n, ANGLE])
         outside = guesses[n, OUTSIDE]
-        rank = time[n] / (4.0 * horizon) if outside <= INSIDE else 0.5 + 0.5 * min(outside, 0.9)
-        key[n] = guesses[n, NODE] + min(rank, 0.99)
+        rank = time[n] / (4.0 * task[DEADLINE]) if outside <= INSIDE else 0.5 + 0.5 * min(outside, 0.9)
+        key[n] = guesses[n, TASK] * nodes + guesses[n, NODE] + min(rank, 0.99)
     order = ranks(key)
     begin = np.empty(count + 1, np.int64)
     groups = 0
     for n in range(count):
-        if n == 0 or guesses[order[n], NODE] != guesses[order[n - 1], NODE]:
+        if n == 0 or math.floor(key[order[n]]) != math.floor(key[order[n - 1]]):
             begin[groups] = n
             groups += 1
     begin[groups] = count
     result = np.empty((groups, ROW))
-    earliest = np.empty(groups)
+    shortest = np.empty(groups)
     for g in range(groups):
-        result[g, 0] = guesses[order[begin[g]], NODE]
-        store(result[g, 1:], no_edge(NO_HIT))
-        earliest[g] = time[order[begin[g]]]
-    # flights of about the same length go together
-    queue = ranks(earliest)
+        first = guesses[order[begin[g]]]
+        result[g, 0], result[g, 1] = first[TASK], first[NODE]
+        store(result[g, 2:], no_edge(NO_HIT))
+        shortest[g] = -time[order[begin[g]]]
+    # long flights first: at the end, when lanes run out of work, the rest is short
+    queue = ranks(shortest)
     following = begin[:groups].copy()
     group = np.zeros(LANES, np.int64)
-    lanes[STATE] = IDLE
     taken = 0
-    while True:
-        busy = False
+    flying = 0
+    lanes[LEFT] = math.inf
+    for n in range(LANES):
+        if taken < groups:
+            group[n] = queue[taken]
+            _take(medium, position, origin, departure, backward, tasks, guesses[order[begin[group[n]]]], lanes, n)
+            taken += 1
+            flying += 1
+    while flying > 0:
+        advance(medium.flow, lanes)
+        widen(lanes)
         for n in range(LANES):
-            if lanes[STATE, n] == IDLE and taken < groups:
-                group[n] = queue[taken]
-                taken += 1
-                _take(position, backward, x, y, z, guesses[order[following[group[n]]]], lanes, n)
-            busy |= lanes[STATE, n] == OPEN
-        if not busy:
-            return result
-        steer_lanes(flow, polar, direction, t, integration.dt, horizon, lanes)
-        for n in range(LANES):
-            if lanes[STATE, n] == OPEN or lanes[STATE, n] == IDLE:
+            if lanes[LEFT, n] > 0.0:
+                continue
+            correct(medium.polar, lanes, n, medium.integration.dt)
+            if lanes[STATE, n] == OPEN:
                 continue
             g = group[n]
-            known = result[g, 1] == CONNECTED
-            if lanes[STATE, n] == HIT and not (known and edge_cost(lanes[TIME, n]) >= result[g, 3]):
-                x_q, y_q, z_q = position[int(result[g, 0])]
-                if backward:
-                    edge = checked_leg(
-                        flow, terrain, polar, integration, direction, x_q, y_q, z_q, x, y, z, t, lanes, n
-                    )
-                else:
-                    edge = checked_leg(
-                        flow, terrain, polar, integration, direction, x, y, z, x_q, y_q, z_q, t, lanes, n
-                    )
+            row = result[g, 2:]
+            known = row[0] == CONNECTED
+            arrives = lanes[STATE, n] == HIT and lanes[TIME, n] <= tasks[int(result[g, 0]), DEADLINE]
+            if arrives and not (known and edge_cost(lanes[TIME, n]) >= row[2]):
+                edge = checked_leg(medium, lanes, n)
                 if edge.status == CONNECTED or (edge.status == BLOCKED and not known):
-                    store(result[g, 1:], edge)
+                    store(row, edge)
                     known = edge.status == CONNECTED
             following[g] += 1
-            lanes[STATE, n] = IDLE
-            if following[g] == begin[g + 1] or following[g] - begin[g] == MAX_TRIES:
-                continue
-            guess = order[following[g]]
-            if known and (guesses[guess, OUTSIDE] > INSIDE or edge_cost(time[guess]) >= result[g, 3]):
-                continue
-            _take(position, backward, x, y, z, guesses[guess], lanes, n)
+            more = following[g] < begin[g + 1] and following[g] - begin[g] < MAX_TRIES
+            if more and known:
+                guess = order[following[g]]
+                more = guesses[guess, OUTSIDE] <= INSIDE and edge_cost(time[guess]) < row[2]
+            if not more:
+                if taken == groups:
+                    flying -= 1
+                    continue
+                g = queue[taken]
+                group[n] = g
+                taken += 1
+            _take(medium, position, origin, departure, backward, tasks, guesses[order[following[g]]], lanes, n)
+    return result
 
 
 @njit
-def _take(position, backward, x, y, z, guess, lanes, n):
+def _take(medium, position, origin, departure, backward, tasks, guess, lanes, n):
+    """Aim lane n by a first guess."""
+    task = tasks[int(guess[TASK])]
+    x, y, z = origin[int(task[ORIGIN])]
     x_q, y_q, z_q = position[int(guess[NODE])]
+    sign = 1.0
     if backward:
-        aim(lanes, n, x_q, y_q, z_q, x, y, z, guess[ANGLE], guess[HEADING])
-    else:
-        aim(lanes, n, x, y, z, x_q, y_q, z_q, guess[ANGLE], guess[HEADING])
+        x, y, z, x_q, y_q, z_q = x_q, y_q, z_q, x, y, z
+        sign = -1.0
     for m in range(4):
-        lanes[steer.INVERSE + m, n] = -guess[INVERSE + m] if backward else guess[INVERSE + m]
+        lanes[steer.INVERSE + m, n] = sign * guess[INVERSE + m]
+    t, dt = departure[int(task[ORIGIN])], medium.integration.dt
+    control = guess[ANGLE], guess[HEADING]
+    aim(medium.polar, lanes, n, task[DIRECTION], x, y, z, t, x_q, y_q, z_q, *control, dt)
 
 
 @njit
@@ -164,85 +179,90 @@ def first_deadline(bins, polar, direction, z, outward, limit, horizon):
     return deadline
 
 
-@njit
-def reach(
-    flow, terrain, polar, steering, bins, integration, position, wanted, x, y, z, t, backward, limit, found
-):  # fmt: skip
-    """The cheapest exact legs between (x, y, z) and the wanted nodes, diving and climbing, into rows of `found`.
-
-    With a `limit`, a fan is cut at a deadline, which is doubled until that many of its legs arrive before it;
-    the fastest so many are kept of each direction. Returns how many legs there are, `found` full or not.
-    """
-    horizon = integration.dt * integration.steps
-    lanes = steering_lanes()
-    lowest, highest = -math.inf, math.inf
-    if wanted.size > 0:
-        lowest, highest = z, z
-        for n in range(wanted.size):
-            if wanted[n]:
-                lowest, highest = min(lowest, position[n, 2]), max(highest, position[n, 2])
-    count = 0
-    for direction in range(2):
-        outward = 1 - direction if backward else direction
-        deepest = highest if outward == CLIMB else lowest
-        deadline = horizon
-        if limit > 0:
-            deadline = first_deadline(bins, polar, direction, z, outward, limit, horizon)
-        while True:
-            guesses, guessed = fan_guesses(
-                flow, polar, steering, bins, position, wanted, direction, backward, x, y, z, t, deepest,
-                integration.dt * FAN_STEP, deadline, lanes,
-            )  # fmt: skip
-            rows = polish(
-                flow, terrain, polar, integration, position, direction, backward, x, y, z, t, guesses, guessed,
-                deadline, lanes,
-            )  # fmt: skip
-            arrived = 0
-            for n in range(rows.shape[0]):
-                arrived += rows[n, 1] == CONNECTED
-            if arrived >= limit or deadline >= horizon:
-                break
-            deadline = min(2.0 * deadline, horizon)
-        # NaN, the cost of what is not connected, sorts last
-        kept = ranks(rows[:, 3].copy())
-        last = min(limit, rows.shape[0]) if limit > 0 else rows.shape[0]
-        for n in range(last):
-            if count < found.shape[0]:
-                found[count] = rows[kept[n]]
-            count += 1
-    return count
-
-
 @entry_point(nogil=True)
 def reach_points(
-    flow, terrain, polar, steering, bins, integration, position, origin, departure, backward, indptr, target,
-    limit, counts, found, first, last,
+    medium, steering, bins, position, origin, departure, backward, indptr, target, limit, counts, found, first,
+    last,
 ):  # fmt: skip
-    """The legs from the points origin[first:last] [m], left at `departure` [s], to nodes under their fans.
+    """The cheapest exact legs from the points origin[first:last] [m], left at `departure` [s], to nodes.
 
     To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with `backward` from
-    them. Into rows of `found` (n, capacity, ROW); a count above the capacity says how much is needed.
+    them. With a `limit`, a fan is cut at a deadline, which is doubled until that many of its legs arrive before
+    it; the fastest so many are kept of each direction. Into rows of `found` (n, capacity, node and fields of
+    Edge); a count above the capacity says how much is needed.
     """
+    horizon = medium.integration.dt * medium.integration.steps
+    lanes = hangar(max(STEER_ROWS, FAN_ROWS))
     wanted = np.zeros(position.shape[0] if indptr.size > 0 else 0, np.bool_)
-    for n in range(first, last):
-        x, y, z = origin[n]
-        t = departure[n]
+    tasks = np.zeros((2 * (last - first), 4))
+    for task in range(tasks.shape[0]):
+        n, direction = first + task // 2, task % 2
         counts[n] = 0
-        if not contains(flow, x, y, t):
-            continue
-        if indptr.size > 0:
-            wanted[:] = False
-            for k in range(indptr[n], indptr[n + 1]):
-                wanted[target[k]] = True
-        counts[n] = reach(
-            flow, terrain, polar, steering, bins, integration, position, wanted, x, y, z, t, backward, limit,
-            found[n],
-        )  # fmt: skip
+        tasks[task, ORIGIN], tasks[task, DIRECTION], tasks[task, DEADLINE] = n, direction, horizon
+        if not contains(medium.flow, origin[n, 0], origin[n, 1], departure[n]):
+            tasks[task, DONE] = 1.0
+        elif limit > 0:
+            outward = 1 - direction if backward else direction
+            z = origin[n, 2]
+            tasks[task, DEADLINE] = first_deadline(bins, medium.polar, direction, z, outward, limit, horizon)
+    guesses = np.empty((1024, GUESS_COLUMNS))
+    while True:
+        count = np.int64(0)  # not a literal: what takes it is compiled once
+        for task in range(tasks.shape[0]):
+            if tasks[task, DONE]:
+                continue
+            n, direction = int(tasks[task, ORIGIN]), int(tasks[task, DIRECTION])
+            x, y, z = origin[n]
+            lowest, highest = -math.inf, math.inf
+            if indptr.size > 0:
+                lowest, highest = z, z
+                for k in range(indptr[n], indptr[n + 1]):
+                    wanted[target[k]] = True
+                    lowest, highest = min(lowest, position[target[k], 2]), max(highest, position[target[k], 2])
+            deepest = highest if (direction == CLIMB) != backward else lowest
+            guesses, count = fan_guesses(
+                medium, steering, bins, position, wanted, task, direction, backward, x, y, z, departure[n],
+                deepest, tasks[task, DEADLINE], medium.integration.dt * FAN_STEP, guesses, count, lanes,
+            )  # fmt: skip
+            if indptr.size > 0:
+                for k in range(indptr[n], indptr[n + 1]):
+                    wanted[target[k]] = False
+        rows = polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes)
+        begin = 0
+        waiting = False
+        for task in range(tasks.shape[0]):
+            end = begin
+            arrived = 0
+            while end < rows.shape[0] and rows[end, 0] == task:
+                arrived += rows[end, 2] == CONNECTED
+                end += 1
+            if not tasks[task, DONE]:
+                if arrived >= limit or tasks[task, DEADLINE] >= horizon:
+                    _keep(rows[begin:end], limit, counts, found, int(tasks[task, ORIGIN]))
+                    tasks[task, DONE] = 1.0
+                else:
+                    tasks[task, DEADLINE] = min(2.0 * tasks[task, DEADLINE], horizon)
+                    waiting = True
+            begin = end
+        if not waiting:
+            return
+
+
+@njit
+def _keep(rows, limit, counts, found, n):
+    """The rows of one task, the cheapest `limit` of them if there is one, into found[n]."""
+    # NaN, the cost of what is not connected, sorts last
+    kept = ranks(rows[:, 4].copy())
+    last = min(limit, rows.shape[0]) if limit > 0 else rows.shape[0]
+    for k in range(last):
+        if counts[n] < found.shape[1]:
+            found[n, counts[n]] = rows[kept[k], 1:]
+        counts[n] += 1
 
 
 @entry_point()
-def quick_statuses(flow, polar, integration, position, departure, source, indptr, target):
-    """`quick_status` of all pairs, as `connect_all` takes them; NO_HIT where nothing forbids a leg: (pairs,)."""
+def quick_statuses(medium, position, departure, source, indptr, target):
+    """`quick_status` of all pairs, taken as in `connect_nodes`; NO_HIT where nothing forbids a leg: (pairs,)."""
     statuses = np.empty(target.size)
     for n in range(source.size):
         x_p, y_p, z_p = position[source[n]]
@@ -250,6 +270,6 @@ def quick_statuses(flow, polar, integration, position, departure, source, indptr
             x_q, y_q, z_q = position[target[k]]
             direction = 1 if z_q > z_p else 0
             t = departure[source[n]]
-            status = quick_status(flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, integration)
+            status = quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t)
             statuses[k] = NO_HIT if status == CONNECTED else status
     return statuses

@@ -10,10 +10,10 @@ import glider_stream
 
 PACKAGE = Path(glider_stream.__file__).parent
 FLOORS = {
-    0: "kernels.cache kernels.flow kernels.cost kernels.terrain",
+    0: "kernels.cache kernels.interpolate kernels.flow kernels.cost kernels.terrain",
     1: "kernels.stream kernels.motion",
     2: "kernels.control",
-    3: "kernels.fan kernels.steer kernels.edges kernels.reach errors settings threads",
+    3: "kernels.flight kernels.fan kernels.steer kernels.edges kernels.reach errors settings threads",
     4: "bins glider flow domain frame ocean ocean_flow terrain",
     5: "sampling neighbours edges legs",
     6: "roadmap",
