@@ -1,4 +1,4 @@
-"""The disk cache of compiled entry points, keyed by the text of every kernel."""
+"""How kernels are compiled; the disk cache of entry points, keyed by the text of every kernel."""
 
 import hashlib
 import os
@@ -41,6 +41,20 @@ def cache_folder() -> Path | None:
     return next((p / KERNEL_DIGEST[:16] for p in places if _writable(p / KERNEL_DIGEST[:16])), None)
 
 
+ARITHMETIC = {"error_model": "numpy"}
+"""A division by zero gives inf or NaN: raising would put a branch beside each one."""
+BARE = ARITHMETIC | {"_nrt": False}
+"""For kernels that make no array. Numba otherwise counts references to every array of a flow at every call, with
+instructions that make the threads wait for each other: 6 times the cost of a look at a flight."""
+
+making = njit(_nrt=True, **ARITHMETIC)
+"""Compiles a kernel that makes an array."""
+kernel = njit(**BARE)
+"""Compiles a kernel that makes none, nor takes one that a callee has made."""
+inlined = njit(inline="always", **BARE)
+"""As `kernel`, and put in the place of its call."""
+
+
 def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a kernel that Python calls, cached on disk under the digest of all kernel sources.
 
@@ -51,10 +65,10 @@ def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def compiled(function: Callable[..., Any]) -> Any:
         folder, before = cache_folder(), config.CACHE_DIR
         if folder is None:
-            return njit(**options)(function)
+            return njit(**ARITHMETIC, **options)(function)
         try:
             config.CACHE_DIR = str(folder)
-            return njit(cache=True, **options)(function)
+            return njit(cache=True, **ARITHMETIC, **options)(function)
         finally:
             config.CACHE_DIR = before
 

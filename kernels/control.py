@@ -7,9 +7,9 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba import njit
 from numba.extending import overload
 
+from .cache import BARE, kernel
 from .flow import Array, mean_velocity
 from .stream import stream_value
 
@@ -43,7 +43,7 @@ class Control(NamedTuple):
     speed: float
 
 
-@njit
+@kernel
 def glide_speed(polar, direction, angle):
     """V [m/s] at a glide angle's magnitude [rad]."""
     last = polar.speed.shape[1] - 1
@@ -54,19 +54,19 @@ def glide_speed(polar, direction, angle):
     return low + (at - below) * (polar.speed[direction, below + 1] - low)
 
 
-@njit
+@kernel
 def horizontal_speed(polar, direction, angle):
     """V cos(gamma) [m/s]."""
     return glide_speed(polar, direction, angle) * math.cos(angle)
 
 
-@njit
+@kernel
 def vertical_speed(polar, direction, angle):
     """V |sin(gamma)| [m/s]; it rises with the angle."""
     return glide_speed(polar, direction, angle) * math.sin(angle)
 
 
-@njit
+@kernel
 def control_towards(polar, direction, angle, heading):
     """The control at a glide angle's magnitude and a heading [rad]."""
     speed = glide_speed(polar, direction, angle)
@@ -77,7 +77,7 @@ def control_towards(polar, direction, angle, heading):
     )
 
 
-@njit
+@kernel
 def angle_of_horizontal_speed(polar, direction, speed, outer):
     """The angle between `outer`, one end of the range, and the fastest, at which V cos(gamma) = speed.
 
@@ -96,7 +96,7 @@ def angle_of_horizontal_speed(polar, direction, speed, outer):
     return fast
 
 
-@njit
+@kernel
 def angle_of_vertical_speed(polar, direction, speed):
     """The shallowest angle that sinks or climbs at least this fast; NaN where none does."""
     low = polar.shallowest[direction]
@@ -130,7 +130,7 @@ class ControlPlane(NamedTuple):
     v: float
 
 
-@njit
+@kernel
 def control_plane(flow, x_p, y_p, z_p, x_q, y_q, z_q, t):
     """The control plane of a pair (design, section 3, step 3): A = dy, B = -dx, C = psi_c."""
     a = y_q - y_p
@@ -158,7 +158,7 @@ class Surface(NamedTuple):
 Steering = Streamline | Surface
 
 
-@njit
+@kernel
 def heading_on_line(plane, horizontal, branch):
     """Heading of the control on the plane at a horizontal speed: V_min <= speed, branch +1 or -1.
 
@@ -223,7 +223,7 @@ def candidate_controls(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q
     return method(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls)
 
 
-@overload(candidate_controls)
+@overload(candidate_controls, jit_options=BARE)
 def _candidate_controls_in_kernels(
     steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
 ):

@@ -1,9 +1,9 @@
 """What an edge costs: travel time [s]."""
 
-from numba import njit
+from .cache import kernel
 
 
-@njit
+@kernel
 def edge_cost(duration):
     """Cost of a leg from its duration [s]; it never falls as the duration grows."""
     return duration

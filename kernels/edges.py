@@ -5,9 +5,8 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from .cache import entry_point
+from .cache import entry_point, inlined, kernel
 from .control import (
     CLIMB,
     DIVE,
@@ -18,8 +17,23 @@ from .control import (
     vertical_speed,
 )
 from .cost import edge_cost
-from .flow import Flow, contains
-from .motion import Integration, arrival_window, closest_approach, is_clear
+from .flight import FLIGHT_ROWS, LAST, LEFT, advance, hangar, place, rest, stayed_inside, widen
+from .flow import Flow, carry, contains
+from .motion import (
+    LANES,
+    H,
+    Integration,
+    U,
+    V,
+    W,
+    X,
+    Y,
+    Z,
+    along_segment,
+    arrival_window,
+    closest_approach,
+    is_clear,
+)
 from .terrain import Terrain
 
 
@@ -68,13 +82,13 @@ class Edge(NamedTuple):
     miss: float
 
 
-@njit(inline="always")
+@inlined
 def no_edge(status):
     """An edge that is not there, and why."""
     return Edge(status, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
-@njit(inline="always")
+@inlined
 def store(row, edge):
     """The fields of an edge into `row` (7,)."""
     row[0] = edge.status
@@ -86,7 +100,7 @@ def store(row, edge):
     row[6] = edge.miss
 
 
-@njit
+@kernel
 def quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t):
     """What can be told of a pair before any control is looked at; CONNECTED where nothing forbids it."""
     flow, polar, integration = medium.flow, medium.polar, medium.integration
@@ -103,56 +117,187 @@ def quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t):
     return CONNECTED
 
 
-@njit
-def connect(medium, steering, x_p, y_p, z_p, x_q, y_q, z_q, t, controls):
-    """The cheapest leg from p, left at t [s], to q among the candidate controls (scratch: `controls`)."""
-    flow, polar, integration = medium.flow, medium.polar, medium.integration
+_ROWS = range(FLIGHT_ROWS, FLIGHT_ROWS + 18)
+PAIR, CONTROL, ANGLE, HEADING = _ROWS[:4]
+"""Rows of a lane beyond `flight`'s own: its pair, its control's number, magnitude of the angle, heading."""
+START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z = _ROWS[4:11]
+STEP, STRIDE, OPENS, CLOSES = _ROWS[11:15]
+"""Steps done; steps from the last look to the next; the steps at which the arrival window opens and closes."""
+MISS, DURATION, SLACK = _ROWS[15:]
+"""Closest approach so far [m], and when [s]; what the control and the tolerance add to the flow's carry [m]."""
+BEFORE_X, BEFORE_Y, APPROACH_ROWS = _ROWS.stop, _ROWS.stop + 1, _ROWS.stop + 2
+LOOK_EVERY = 4
+"""Steps between looks at a path that is not yet in its arrival window."""
+SOURCE, TARGET, NEXT, COUNT = range(4)
+"""Where a batch of pairs stands: source, target, the next of its controls and how many there are."""
+
+
+@kernel
+def _begin_pair(medium, steering, position, departure, p, q, controls, edge):
+    """Fill in a pair's candidate controls, and why there is no edge so far; returns how many there are."""
+    polar, integration = medium.polar, medium.integration
+    x_p, y_p, z_p = position[p]
+    x_q, y_q, z_q = position[q]
+    t = departure[p]
     direction = CLIMB if z_q > z_p else DIVE
     status = quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t)
-    if status != CONNECTED:
-        return no_edge(status)
-    slowest = abs(z_q - z_p) / (integration.steps * integration.dt)
-    count = candidate_controls(
-        steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
-    )
-    if count == NO_CONTROL:
-        return no_edge(CURRENT_TOO_STRONG)
-    if count == 0:
-        return no_edge(TOO_FAR)
-    best = no_edge(NO_HIT)
-    for n in range(count):
-        c = control_towards(polar, direction, controls[n, 0], controls[n, 1])
-        first, _ = arrival_window(c.w, z_q - z_p, integration.tolerance)
-        # controls come in order of arrival: from here on all are dearer
-        if best.status == CONNECTED and edge_cost(first) >= best.cost:
-            break
-        miss, time = closest_approach(flow, x_p, y_p, z_p, t, c.u, c.v, c.w, x_q, y_q, z_q, integration)
-        if miss >= integration.tolerance or (best.status == CONNECTED and edge_cost(time) >= best.cost):
+    count = 0
+    if status == CONNECTED:
+        slowest = abs(z_q - z_p) / (integration.steps * integration.dt)
+        count = candidate_controls(
+            steering, medium.flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
+        )
+        status = CURRENT_TOO_STRONG if count == NO_CONTROL else (TOO_FAR if count == 0 else NO_HIT)
+    store(edge, no_edge(status))
+    return max(count, 0)
+
+
+@kernel
+def _out_of_reach(medium, lanes, n):
+    """Whether the flow, at its fastest, can no longer carry lane n to its target in time."""
+    dt = medium.integration.dt
+    left = (lanes[CLOSES, n] - lanes[STEP, n]) * dt
+    off_x = lanes[GOAL_X, n] - (lanes[X, n] + lanes[U, n] * left)
+    off_y = lanes[GOAL_Y, n] - (lanes[Y, n] + lanes[V, n] * left)
+    w = lanes[W, n]
+    end = lanes[START_Z, n] + lanes[CLOSES, n] * dt * w
+    carried = carry(medium.flow, end) - carry(medium.flow, lanes[START_Z, n] + lanes[STEP, n] * dt * w)
+    far = abs(carried / w) + lanes[SLACK, n]
+    return off_x * off_x + off_y * off_y > far * far
+
+
+@kernel
+def _launch(medium, steering, position, departure, source, indptr, target, controls, at, last, edges, lanes, n):
+    """Send lane n off with the next control of the batch that may hit; False where there is none left."""
+    integration = medium.integration
+    dt = integration.dt
+    while True:
+        if at[NEXT] == at[COUNT]:
+            at[TARGET] += 1
+            while at[SOURCE] < last and at[TARGET] == indptr[at[SOURCE] + 1]:
+                at[SOURCE] += 1
+            if at[SOURCE] == last:
+                return False
+            p, k = source[at[SOURCE]], at[TARGET]
+            at[NEXT] = 0
+            at[COUNT] = _begin_pair(medium, steering, position, departure, p, target[k], controls, edges[k])
             continue
-        terrain = medium.terrain
-        if is_clear(flow, terrain, x_p, y_p, z_p, t, c.u, c.v, c.w, time, integration.dt, CLEARANCE_SPACING):
-            best = Edge(CONNECTED, time, edge_cost(time), c.glide_angle, c.heading, c.speed, miss)
-        elif best.status == NO_HIT:
-            best = no_edge(BLOCKED)
-    return best
+        p, k = source[at[SOURCE]], at[TARGET]
+        x, y, z = position[p]
+        x_q, y_q, z_q = position[target[k]]
+        angle, heading = controls[at[NEXT]]
+        c = control_towards(medium.polar, CLIMB if z_q > z else DIVE, angle, heading)
+        first, final = arrival_window(c.w, z_q - z, integration.tolerance)
+        lanes[CONTROL, n] = at[NEXT]
+        at[NEXT] += 1
+        # controls come in order of arrival: from here on all are dearer
+        if edges[k, 0] == CONNECTED and edge_cost(first) >= edges[k, 2]:
+            at[NEXT] = at[COUNT]
+            continue
+        place(lanes, n, x, y, z, departure[p], c.u, c.v, c.w)
+        lanes[PAIR, n], lanes[ANGLE, n], lanes[HEADING, n] = k, angle, heading
+        lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n] = x, y, z, departure[p]
+        lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n] = x_q, y_q, z_q
+        lanes[STEP, n], lanes[OPENS, n] = 0.0, math.floor(first / dt)
+        lanes[CLOSES, n] = min(float(integration.steps), math.floor(final / dt) + 1.0)
+        lanes[SLACK, n] = math.hypot(c.u, c.v) * (lanes[CLOSES, n] * dt - first) + integration.tolerance
+        lanes[MISS, n], lanes[DURATION, n] = math.inf, math.inf
+        if _out_of_reach(medium, lanes, n):
+            continue
+        lanes[H, n] = lanes[LAST, n] = dt
+        _fly_on(lanes, n)
+        return True
 
 
-@njit
-def connect_node(medium, steering, position, departure, node, targets, edges):
-    """All targets of one source node, into rows of `edges` (targets, fields of Edge)."""
-    controls = np.empty((steering.candidates, 2))
-    x_p, y_p, z_p = position[node]
-    for n in range(targets.size):
-        x_q, y_q, z_q = position[targets[n]]
-        store(edges[n], connect(medium, steering, x_p, y_p, z_p, x_q, y_q, z_q, departure[node], controls))
+@inlined
+def _fly_on(lanes, n):
+    """Let lane n fly until it is worth a look: step by step where it may arrive."""
+    lanes[BEFORE_X, n], lanes[BEFORE_Y, n] = lanes[X, n], lanes[Y, n]
+    stride = max(1.0, min(float(LOOK_EVERY), lanes[OPENS, n] - lanes[STEP, n]))
+    lanes[STRIDE, n] = lanes[LEFT, n] = stride
+
+
+@kernel
+def _look(medium, lanes, n):
+    """Measure lane n's last steps against its target; whether its flight is over."""
+    dt = medium.integration.dt
+    x, y, z, t = lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n]
+    x_q, y_q, z_q = lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n]
+    w = lanes[W, n]
+    lanes[STEP, n] += lanes[STRIDE, n]
+    step = lanes[STEP, n]
+    if not stayed_inside(medium.flow, lanes, n, t, step * dt):
+        # a path that leaves the flow ends: step by step, where does it?
+        lanes[MISS, n], lanes[DURATION, n] = closest_approach(
+            medium.flow, x, y, z, t, lanes[U, n], lanes[V, n], w, x_q, y_q, z_q, medium.integration
+        )
+        return True
+    lanes[Z, n] = z + step * dt * w
+    if step > lanes[OPENS, n]:
+        before = z + (step - 1.0) * dt * w
+        share, miss = along_segment(
+            lanes[BEFORE_X, n], lanes[BEFORE_Y, n], before, lanes[X, n], lanes[Y, n], lanes[Z, n], x_q, y_q, z_q
+        )
+        if miss < lanes[MISS, n]:
+            lanes[MISS, n], lanes[DURATION, n] = miss, (step - 1.0 + share) * dt
+        if step == lanes[CLOSES, n]:
+            return True
+    if _out_of_reach(medium, lanes, n):
+        return True
+    _fly_on(lanes, n)
+    return False
+
+
+@kernel
+def _settle(medium, lanes, n, edge, chosen):
+    """Let lane n's closest approach be the edge, where it hits and is cheaper; returns the chosen control."""
+    integration = medium.integration
+    duration = lanes[DURATION, n]
+    if lanes[MISS, n] >= integration.tolerance:
+        return chosen
+    cost = edge_cost(duration)
+    if edge[0] == CONNECTED and (cost, lanes[CONTROL, n]) >= (edge[2], chosen):
+        return chosen
+    x, y, z, t = lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n]
+    direction = CLIMB if lanes[W, n] > 0.0 else DIVE
+    c = control_towards(medium.polar, direction, lanes[ANGLE, n], lanes[HEADING, n])
+    ends = x, y, z, t, c.u, c.v, c.w, duration, integration.dt, CLEARANCE_SPACING
+    if is_clear(medium.flow, medium.terrain, *ends):
+        store(edge, Edge(CONNECTED, duration, cost, c.glide_angle, c.heading, c.speed, lanes[MISS, n]))
+        return lanes[CONTROL, n]
+    if edge[0] == NO_HIT:
+        store(edge, no_edge(BLOCKED))
+    return chosen
 
 
 @entry_point(nogil=True)
 def connect_nodes(medium, steering, position, departure, source, indptr, target, edges, first, last):
-    """All targets of source[first:last], CSR by source in `indptr` (n + 1,) and `target` (pairs,).
+    """The cheapest legs to all targets of source[first:last] among the candidate controls of each pair.
 
-    `position` (nodes, 3) [m], `departure` (nodes,) [s]; outcomes into `edges` (pairs, fields of Edge).
+    CSR by source in `indptr` (n + 1,) and `target` (pairs,); `position` (nodes, 3) [m], `departure` (nodes,)
+    [s]; outcomes into `edges` (pairs, fields of Edge). Equal to `closest_approach` of every control: outcomes
+    do not depend on which flights share the air.
     """
-    for n in range(first, last):
-        row = slice(indptr[n], indptr[n + 1])
-        connect_node(medium, steering, position, departure, source[n], target[row], edges[row])
+    lanes = hangar(APPROACH_ROWS)
+    controls = np.empty((steering.candidates, 2))
+    chosen = np.empty(indptr[last] - indptr[first])
+    at = np.array([first, indptr[first] - 1, 0, 0])
+    flying = 0
+    for n in range(LANES):
+        flying += _launch(
+            medium, steering, position, departure, source, indptr, target, controls, at, last, edges, lanes, n
+        )
+    while flying > 0:
+        advance(medium.flow, lanes)
+        widen(lanes)
+        for n in range(LANES):
+            if lanes[LEFT, n] > 0.0 or not _look(medium, lanes, n):
+                continue
+            k = int(lanes[PAIR, n])
+            one = k - indptr[first]
+            chosen[one] = _settle(medium, lanes, n, edges[k], chosen[one])
+            if not _launch(
+                medium, steering, position, departure, source, indptr, target, controls, at, last, edges, lanes, n
+            ):
+                rest(lanes, n)
+                flying -= 1

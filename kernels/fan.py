@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from .cache import inlined, kernel, making
 from .control import angle_of_vertical_speed, glide_speed, vertical_speed
 from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, place, rest
 from .flow import Array
@@ -69,7 +69,7 @@ class FlowMap(NamedTuple):
     generations: int
 
 
-@njit
+@kernel
 def layers_outward(bins, z, outward, deepest, levels, layers):
     """The bins' levels from z outward, as far as `deepest` [m]: heights and layers; returns how many.
 
@@ -90,7 +90,7 @@ def layers_outward(bins, z, outward, deepest, levels, layers):
     return count
 
 
-@njit
+@kernel
 def fan_rows(steering, polar, direction, rises, horizon, rows):
     """Glide angles of the base mesh's rows, rising, into `rows`; their number, 0 where no level is in reach.
 
@@ -121,7 +121,7 @@ def fan_rows(steering, polar, direction, rises, horizon, rows):
     return filled if steep > shallow else 0
 
 
-@njit
+@kernel
 def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, last, dt, landing, lanes):
     """Fly the controls of vertices first..last - 1 from (x, y, z) at t through `levels`, into rows of `landing`.
 
@@ -156,7 +156,7 @@ def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, la
                 flying -= 1
 
 
-@njit
+@kernel
 def _launch(polar, direction, x, y, z, t, levels, vertex, one, dt, lanes, n):
     """Send lane n off with a vertex's control, to the first level."""
     angle, heading = vertex[one, 0], vertex[one, 1]
@@ -168,14 +168,14 @@ def _launch(polar, direction, x, y, z, t, levels, vertex, one, dt, lanes, n):
     fly_for(lanes, n, (levels[0] - z) / w, dt)
 
 
-@njit(inline="always")
+@inlined
 def _bin_range(low, high, origin, per_bin, count):
     first = int(min(max((low - origin) * per_bin, 0.0), count - 1.0))
     last = int(min(max((high - origin) * per_bin, 0.0), count - 1.0))
     return first, last
 
 
-@njit
+@kernel
 def any_wanted(bins, layer, position, wanted, x_lo, x_hi, y_lo, y_hi):
     """Whether a wanted node of the layer lies in the rectangle [m]."""
     i_first, i_last = _bin_range(x_lo, x_hi, bins.x_lo, bins.per_bin, bins.nx)
@@ -191,7 +191,7 @@ def any_wanted(bins, layer, position, wanted, x_lo, x_hi, y_lo, y_hi):
     return False
 
 
-@njit(inline="always")
+@inlined
 def _inside(ax, ay, bx, by, cx, cy, x, y):
     """(s, r, det) with (x, y) = a + s (b - a) + r (c - a); det 0 where the triangle is flat."""
     det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
@@ -202,7 +202,7 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
     return s, r, det
 
 
-@njit
+@making
 def longer(rows, needed):
     """The rows, and empty ones: twice as many, or as many as are needed."""
     if needed <= rows.shape[0]:
@@ -212,7 +212,7 @@ def longer(rows, needed):
     return grown
 
 
-@njit
+@kernel
 def _patch(landing, corners, i, j, level, patch):
     """Quarter (i, j) of a cell at a level: landings of its corners, and its second derivatives.
 
@@ -234,7 +234,7 @@ def _patch(landing, corners, i, j, level, patch):
         patch[ALONG_HEADING, m] = 0.5 * along_heading
 
 
-@njit
+@kernel
 def _around(bins, patches):
     """The rectangle about a patch, and about its start where nodes lie between: x_lo, x_hi, y_lo, y_hi [m]."""
     x_lo, x_hi, y_lo, y_hi = math.inf, -math.inf, math.inf, -math.inf
@@ -245,7 +245,7 @@ def _around(bins, patches):
     return x_lo, x_hi, y_lo, y_hi
 
 
-@njit
+@kernel
 def _bend(p):
     """How far [m] a patch is from flat: the greatest distance of its middle lines from its linear image."""
     x = p[0, 0] - p[1, 0] - p[2, 0] + p[3, 0]
@@ -255,7 +255,7 @@ def _bend(p):
     return max(twist, along_angle, math.sqrt(p[ALONG_HEADING, 0] ** 2 + p[ALONG_HEADING, 1] ** 2) / 8.0)
 
 
-@njit
+@kernel
 def _folded(p):
     """Whether the two triangles of a patch are turned opposite ways."""
     low = (p[2, 0] - p[0, 0]) * (p[1, 1] - p[0, 1]) - (p[1, 0] - p[0, 0]) * (p[2, 1] - p[0, 1])
@@ -263,7 +263,7 @@ def _folded(p):
     return low * high <= 0.0
 
 
-@njit
+@kernel
 def wants_halving(bins, layer, position, wanted, patches):
     """Whether a patch that is bent or folded has a wanted node within the bend's or the fold's reach."""
     bend = _bend(patches[0])
@@ -275,7 +275,7 @@ def wants_halving(bins, layer, position, wanted, patches):
     return any_wanted(bins, layer, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
 
 
-@njit
+@kernel
 def _solve(p, x, y, s, r):
     """Newton steps from (s, r) towards the point of a patch's quadratic map that is (x, y).
 
@@ -302,7 +302,7 @@ def _solve(p, x, y, s, r):
     return s, r, x_s, x_r, y_s, y_r
 
 
-@njit
+@making
 def guess_in_patch(
     bins, layer, start, end, position, wanted, z, patches, task, angle, da, heading, dh, guesses, count
 ):
@@ -356,7 +356,7 @@ def guess_in_patch(
     return guesses, count
 
 
-@njit
+@making
 def fan_guesses(
     medium, steering, bins, position, wanted, task, direction, backward, x, y, z, t, deepest, horizon, dt,
     guesses, count, lanes,

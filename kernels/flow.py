@@ -11,11 +11,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from .cache import entry_point
+from .cache import BARE, entry_point, inlined, kernel
 from .interpolate import pair_between
 
 JUST_BELOW = 1.0 - 2.0**-52
@@ -209,7 +208,7 @@ def _jet(flow, x, y, z, t):
     return flow.speed if inside else 0.0, 0.0
 
 
-@njit(inline="always")
+@inlined
 def _cell(at, count):
     """The cell below a fractional index, held within the grid, and the weight of its upper end."""
     # NaN (a step that left the grid) must not become an address: the comparisons send it to 0
@@ -220,7 +219,7 @@ def _cell(at, count):
     return np.uintp(below), held - below
 
 
-@njit(inline="always")
+@inlined
 def _slot(at, points, slots, slots_per_unit):
     """As `_cell`, for uneven points: even slots lead to the cell, one comparison settles it."""
     last = np.intp(points.size) - 1
@@ -241,7 +240,7 @@ def _grid(flow, x, y, z, t):
     return pair_between(values, (k, i, j), (c, a, b))
 
 
-@njit(inline="always")
+@inlined
 def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
     """Fractional grid indices (i, j) at (x, y) [m], from a map as `OceanGrid` describes it."""
     p, a = _cell((x - x_lo) * per_x, index_map.shape[0])
@@ -318,7 +317,7 @@ def carry(flow: Flow, z: float) -> float:
     return _CARRY[type(flow)](flow, z)
 
 
-@overload(carry)
+@overload(carry, jit_options=BARE)
 def _carry_in_kernels(flow, z):
     return _CARRY.get(getattr(flow, "instance_class", type(None)))
 
@@ -340,22 +339,22 @@ def contains_box(
     return _CONTAINS_BOX[type(flow)](flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
 
 
-@overload(contains_box)
+@overload(contains_box, jit_options=BARE)
 def _contains_box_in_kernels(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
     return _CONTAINS_BOX.get(getattr(flow, "instance_class", type(None)))
 
 
-@overload(velocity)
+@overload(velocity, jit_options=BARE)
 def _velocity_in_kernels(flow, x, y, z, t):
     return _VELOCITY.get(getattr(flow, "instance_class", type(None)))
 
 
-@overload(contains)
+@overload(contains, jit_options=BARE)
 def _contains_in_kernels(flow, x, y, t):
     return _CONTAINS.get(getattr(flow, "instance_class", type(None)))
 
 
-@njit
+@kernel
 def mean_velocity(flow, x, y, z_from, z_to, t):
     """The 2.5-D flow of a pair: the mean of the currents at its two depths [m/s]."""
     u_from, v_from = velocity(flow, x, y, z_from, t)

@@ -14,6 +14,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
+from .cache import BARE
+
 _FOUR, _TWO = (ir.VectorType(ir.DoubleType(), n) for n in (4, 2))
 _INT = ir.IntType(32)
 
@@ -70,7 +72,7 @@ def _pair_between(typing_context, values, cell, weight):
     return types.UniTuple(types.float64, 2)(values, cell, weight), generate
 
 
-@overload(pair_between, inline="always")
+@overload(pair_between, inline="always", jit_options=BARE)
 def _pair_between_in_kernels(values, cell, weight):
     plain = values.dtype == types.float64 and values.layout == "C"
     if not (plain and values.ndim - 1 == len(cell) == len(weight)):

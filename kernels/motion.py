@@ -4,9 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from .cache import entry_point
+from .cache import entry_point, inlined, kernel, making
 from .flow import carry, contains, velocity
 from .terrain import allowed, open_between
 
@@ -19,7 +18,7 @@ class Integration(NamedTuple):
     tolerance: float
 
 
-@njit(inline="always")
+@inlined
 def rk4_step(flow, x, y, z, t, u, v, w, dt):
     """One RK4 step of dx/dt = flow + (u, v, w), the velocity through water [m/s]; returns x, y [m].
 
@@ -35,7 +34,7 @@ def rk4_step(flow, x, y, z, t, u, v, w, dt):
     return x_next, y_next
 
 
-@njit(inline="always")
+@inlined
 def along_segment(ax, ay, az, bx, by, bz, x, y, z):
     """Share of the segment a -> b, from 0 to 1, and distance [m], at the point nearest to (x, y, z)."""
     dx = bx - ax
@@ -50,13 +49,13 @@ def along_segment(ax, ay, az, bx, by, bz, x, y, z):
     return share, math.sqrt(ex * ex + ey * ey + ez * ez)
 
 
-@njit
+@kernel
 def arrival_window(w, rise, tolerance):
     """First and last time [s] at which depth is within `tolerance` of the target, `rise` [m] above."""
     return max(0.0, (abs(rise) - tolerance) / abs(w)), (abs(rise) + tolerance) / abs(w)
 
 
-@njit
+@kernel
 def closest_approach(flow, x, y, z, t, u, v, w, x_q, y_q, z_q, integration):
     """Miss [m] and time since departure [s] of the path's closest approach to q, along its segments.
 
@@ -94,7 +93,7 @@ def closest_approach(flow, x, y, z, t, u, v, w, x_q, y_q, z_q, integration):
     return miss, duration
 
 
-@njit
+@making
 def trace(flow, x, y, z, t, u, v, w, duration, dt):
     """The path as rows [t, x, y, z]: every full step of `dt`, and the last, shorter one to `duration`."""
     full = int(duration / dt)
@@ -113,7 +112,7 @@ def traced(flow, x, y, z, t, u, v, w, duration, dt):
     return trace(flow, x, y, z, t, u, v, w, duration, dt)
 
 
-@njit
+@making
 def stays_inside(flow, x, y, z, t, u, v, w, duration, dt):
     """Whether every step of the leg begins where the flow is known."""
     rows = trace(flow, x, y, z, t, u, v, w, duration, dt)
@@ -123,7 +122,7 @@ def stays_inside(flow, x, y, z, t, u, v, w, duration, dt):
     return inside
 
 
-@njit
+@making
 def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
     """Whether the whole leg stays where `terrain` allows a glider to be, looked at every `spacing` [m]."""
     if open_between(terrain, z, z + w * duration):
@@ -149,7 +148,7 @@ LANE_ROWS = 16
 """The rows above and the stages' own; a caller's lanes may have more."""
 
 
-@njit
+@kernel
 def _slopes(flow, flat, x, y, share, u, v):
     """Currents of all lanes at rows x, y into rows u, v, at `share` of the step in depth and time."""
     for n in range(LANES):
@@ -163,7 +162,7 @@ def _slopes(flow, flat, x, y, share, u, v):
         )
 
 
-@njit
+@kernel
 def _move(flat, share, u, v):
     """Stage points into rows _XS, _YS: a `share` of the step along the slopes in rows u, v."""
     for n in range(LANES):
@@ -176,7 +175,7 @@ def _move(flat, share, u, v):
         )
 
 
-@njit
+@kernel
 def _sum(flat, place, through, u1, u2, u3, u4):
     for n in range(LANES):
         flat[np.uintp(place * LANES + n)] += flat[np.uintp(H * LANES + n)] * (
@@ -190,7 +189,7 @@ def _sum(flat, place, through, u1, u2, u3, u4):
         )
 
 
-@njit
+@kernel
 def rk4_lanes(flow, lanes):
     """`rk4_step` for LANES trajectories at once, each with its own step H, in place; the same bits.
 

@@ -3,18 +3,17 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from . import steer
-from .cache import entry_point
+from .cache import entry_point, kernel, making
 from .control import CLIMB, angle_of_vertical_speed, control_towards, horizontal_speed, vertical_speed
 from .cost import edge_cost
 from .edges import BLOCKED, CLEARANCE_SPACING, CONNECTED, NO_HIT, Edge, no_edge, quick_status, store
 from .fan import ANGLE, FAN_ROWS, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, fan_guesses
-from .flight import LEFT, advance, hangar
-from .flow import contains, contains_box
+from .flight import LEFT, advance, hangar, stayed_inside, widen
+from .flow import contains
 from .motion import LANES, is_clear, stays_inside
-from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct, widen
+from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct
 
 MAX_TRIES = 12
 """Guesses that are polished for one node."""
@@ -28,13 +27,13 @@ ROW = 9
 """A row of what is polished: the task, the node, the fields of Edge. What is found lacks the task."""
 
 
-@njit
+@making
 def ranks(keys):
     """The order of keys, rising; of equal ones the first."""
     return np.argsort(keys, kind="mergesort")
 
 
-@njit
+@kernel
 def checked_leg(medium, lanes, n):
     """The leg that lane n has found, if it stays where the flow is known and where the terrain allows."""
     flow, dt = medium.flow, medium.integration.dt
@@ -44,17 +43,14 @@ def checked_leg(medium, lanes, n):
     t, time = lanes[steer.START_T, n], lanes[TIME, n]
     if not (contains(flow, x, y, t) and contains(flow, lanes[steer.GOAL_X, n], lanes[steer.GOAL_Y, n], t)):
         return no_edge(NO_HIT)
-    x_lo, x_hi = lanes[steer.X_LO, n], lanes[steer.X_HI, n]
-    y_lo, y_hi = lanes[steer.Y_LO, n], lanes[steer.Y_HI, n]
-    inside = contains_box(flow, x_lo, x_hi, y_lo, y_hi, t, t + time)
-    if not inside and not stays_inside(flow, x, y, z, t, c.u, c.v, c.w, time, dt):
+    if not (stayed_inside(flow, lanes, n, t, time) or stays_inside(flow, x, y, z, t, c.u, c.v, c.w, time, dt)):
         return no_edge(NO_HIT)
     if not is_clear(flow, medium.terrain, x, y, z, t, c.u, c.v, c.w, time, dt, CLEARANCE_SPACING):
         return no_edge(BLOCKED)
     return Edge(CONNECTED, time, edge_cost(time), c.glide_angle, c.heading, c.speed, lanes[steer.MISS, n])
 
 
-@njit
+@making
 def polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes):
     """The cheapest exact leg between each task's point and each node among first guesses: rows (pairs, ROW).
 
@@ -133,7 +129,7 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
     return result
 
 
-@njit
+@kernel
 def _take(medium, position, origin, departure, backward, tasks, guess, lanes, n):
     """Aim lane n by a first guess."""
     task = tasks[int(guess[TASK])]
@@ -150,7 +146,7 @@ def _take(medium, position, origin, departure, backward, tasks, guess, lanes, n)
     aim(medium.polar, lanes, n, task[DIRECTION], x, y, z, t, x_q, y_q, z_q, *control, dt)
 
 
-@njit
+@kernel
 def first_deadline(bins, polar, direction, z, outward, limit, horizon):
     """A time [s] in which a fan may pass over `limit` nodes: a share of the horizon, halved while that is enough.
 
@@ -248,7 +244,7 @@ def reach_points(
             return
 
 
-@njit
+@making
 def _keep(rows, limit, counts, found, n):
     """The rows of one task, the cheapest `limit` of them if there is one, into found[n]."""
     # NaN, the cost of what is not connected, sorts last

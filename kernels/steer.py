@@ -2,11 +2,10 @@
 
 import math
 
-from numba import njit
-
+from .cache import inlined, kernel
 from .control import glide_speed
 from .flight import FLIGHT_ROWS, fly_for, place, rest
-from .motion import LANES, X, Y
+from .motion import X, Y
 
 LANDING_TOLERANCE = 0.005
 """A landing this close to its target [m] is a hit: half of what an edge may miss by."""
@@ -16,22 +15,20 @@ GIVE_UP = 5
 MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
-_ROWS = range(FLIGHT_ROWS, FLIGHT_ROWS + 27)
+_ROWS = range(FLIGHT_ROWS, FLIGHT_ROWS + 23)
 START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z = _ROWS[:7]
 """Rows of a lane beyond `flight`'s own: its ends [m], and when it leaves [s]."""
 DIRECTION, ANGLE, HEADING, TIME, MISS, STATE = _ROWS[7:13]
 """Its control [rad], its time [s] and miss [m], its state."""
-X_LO, X_HI, Y_LO, Y_HI = _ROWS[13:17]
-"""The box [m] about where the steps of a lane's last flight ended."""
-INVERSE = _ROWS[17]
+INVERSE = _ROWS[13]
 """The first of four rows: d(angle, heading) / d(x, y) of the flow map near the guess, row by row."""
-_OFF_X, _OFF_Y, _TURN_A, _TURN_H, _FIRST_MISS, _ITERATION = _ROWS[21:]
+_OFF_X, _OFF_Y, _TURN_A, _TURN_H, _FIRST_MISS, _ITERATION = _ROWS[17:]
 STEER_ROWS = _ROWS.stop
 OPEN, HIT, LOST = 1.0, 2.0, 3.0
 """States: closing in; landed on the target; it leads nowhere."""
 
 
-@njit
+@kernel
 def aim(polar, lanes, n, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt):
     """Send lane n off on a guess of the control [rad] from (x, y, z) at t [s] to q [m].
 
@@ -44,7 +41,7 @@ def aim(polar, lanes, n, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, d
     _take_off(polar, lanes, n, dt)
 
 
-@njit
+@kernel
 def _take_off(polar, lanes, n, dt):
     """Lane n's control, flown from its start to its goal's depth; steps as `motion.trace` takes them."""
     direction = int(lanes[DIRECTION, n])
@@ -55,19 +52,10 @@ def _take_off(polar, lanes, n, dt):
     x, y, z = lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n]
     place(lanes, n, x, y, z, lanes[START_T, n], along * math.cos(heading), along * math.sin(heading), w)
     lanes[TIME, n] = (lanes[GOAL_Z, n] - z) / w
-    lanes[X_LO, n], lanes[X_HI, n], lanes[Y_LO, n], lanes[Y_HI, n] = x, x, y, y
     fly_for(lanes, n, lanes[TIME, n], dt)
 
 
-@njit
-def widen(lanes):
-    """Let the boxes hold where the lanes are."""
-    for n in range(LANES):
-        lanes[X_LO, n], lanes[X_HI, n] = min(lanes[X_LO, n], lanes[X, n]), max(lanes[X_HI, n], lanes[X, n])
-        lanes[Y_LO, n], lanes[Y_HI, n] = min(lanes[Y_LO, n], lanes[Y, n]), max(lanes[Y_HI, n], lanes[Y, n])
-
-
-@njit
+@kernel
 def correct(polar, lanes, n, dt):
     """Lane n has landed: on its target, HIT; nowhere near, LOST; else a Broyden step, and it flies again."""
     direction = int(lanes[DIRECTION, n])
@@ -103,7 +91,7 @@ def correct(polar, lanes, n, dt):
     _take_off(polar, lanes, n, dt)
 
 
-@njit(inline="always")
+@inlined
 def _broyden(lanes, n, dx, dy):
     """Broyden's update of the inverse Jacobian (Sherman-Morrison): it now maps (dx, dy) to the last turn."""
     da, dh = lanes[_TURN_A, n], lanes[_TURN_H, n]

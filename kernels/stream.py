@@ -3,14 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from .cache import kernel
 from .flow import mean_velocity
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-@njit
+@kernel
 def stream_value(flow, x_p, y_p, z_p, x_q, y_q, z_q, t):
     """psi_c = integral of (u dy - v dx) [m^2/s] from p to q, in the 2.5-D mean flow at time t.
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
+from .cache import BARE
 from .flow import Array, grid_index
 
 
@@ -53,7 +54,7 @@ def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
     return _ALLOWED[type(terrain)](terrain, x, y, z)
 
 
-@overload(allowed)
+@overload(allowed, jit_options=BARE)
 def _allowed_in_kernels(terrain, x, y, z):
     return _ALLOWED.get(getattr(terrain, "instance_class", type(None)))
 
@@ -74,6 +75,6 @@ def open_between(terrain: Terrain, z: float, z_end: float) -> bool:
     return _OPEN_BETWEEN[type(terrain)](terrain, z, z_end)
 
 
-@overload(open_between)
+@overload(open_between, jit_options=BARE)
 def _open_between_in_kernels(terrain, z, z_end):
     return _OPEN_BETWEEN.get(getattr(terrain, "instance_class", type(None)))

@@ -40,7 +40,7 @@ EDIT = """
 _of_the_file = edge_cost
 
 
-@njit
+@kernel
 def edge_cost(*given):
     return 2.0 * _of_the_file(*given)
 """
