@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bins import node_bins
 from .flow import is_steady
-from .kernels import control, edges, flow, motion, reach, terrain
+from .kernels import control, edges, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
 from .settings import require
@@ -26,8 +26,8 @@ MAX_FAN, MAX_GENERATIONS = 1000, 6
 
 
 @dataclass(frozen=True)
-class StreamlineMethod:
-    """The paper's method: controls on the control line; `candidates` counts those integrated."""
+class SurfaceMethod:
+    """The paper's baseline: controls over the whole control surface; `candidates` counts those integrated."""
 
     candidates: int
 
@@ -37,16 +37,21 @@ class StreamlineMethod:
 
     def kernel(self) -> control.Steering:
         """As the kernels read it."""
-        return control.Streamline(self.candidates)
+        return control.Surface(self.candidates)
 
 
 @dataclass(frozen=True)
-class SurfaceMethod(StreamlineMethod):
-    """The paper's baseline: controls over the whole control surface."""
+class StreamlineMethod(SurfaceMethod):
+    """The paper's method: controls on the control line.
+
+    With `refine`, those that land nearest are first guesses of exact legs, polished as the flow map's are.
+    """
+
+    refine: bool = False
 
     def kernel(self) -> control.Steering:
         """As the kernels read it."""
-        return control.Surface(self.candidates)
+        return control.Streamline(self.candidates)
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ class FlowMapMethod:
         return FlowMap(*self.fan, self.generations)
 
 
-Method = StreamlineMethod | FlowMapMethod
+Method = SurfaceMethod | StreamlineMethod | FlowMapMethod
 METHODS: dict[str, type[Method]] = {
     "streamline": StreamlineMethod,
     "surface": SurfaceMethod,
@@ -138,7 +143,9 @@ class Evaluator:
             result = self._connect_by_fan(*pairs)
         else:
             result = np.empty((targets.size, 7))
-            task = partial(edges.connect_nodes, self._medium, self.steering.kernel(), *pairs, result)
+            refines = isinstance(self.steering, StreamlineMethod) and self.steering.refine
+            connect = refine.refine_nodes if refines else edges.connect_nodes
+            task = partial(connect, self._medium, self.steering.kernel(), *pairs, result)
             in_parallel(task, sources.size, NODES_AT_ONCE)
         return result
 

@@ -41,17 +41,17 @@ def cache_folder() -> Path | None:
     return next((p / KERNEL_DIGEST[:16] for p in places if _writable(p / KERNEL_DIGEST[:16])), None)
 
 
-ARITHMETIC = {"error_model": "numpy"}
+ARITHMETIC: dict[str, Any] = {"error_model": "numpy"}
 """A division by zero gives inf or NaN: raising would put a branch beside each one."""
-BARE = ARITHMETIC | {"_nrt": False}
+BARE: Any = ARITHMETIC | {"_nrt": False}
 """For kernels that make no array. Numba otherwise counts references to every array of a flow at every call, with
 instructions that make the threads wait for each other: 6 times the cost of a look at a flight."""
 
-making = njit(_nrt=True, **ARITHMETIC)
+making = njit(**ARITHMETIC | {"_nrt": True})
 """Compiles a kernel that makes an array."""
 kernel = njit(**BARE)
 """Compiles a kernel that makes none, nor takes one that a callee has made."""
-inlined = njit(inline="always", **BARE)
+inlined = njit(**BARE | {"inline": "always"})
 """As `kernel`, and put in the place of its call."""
 
 

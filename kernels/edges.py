@@ -133,7 +133,7 @@ SOURCE, TARGET, NEXT, COUNT = range(4)
 
 
 @kernel
-def _begin_pair(medium, steering, position, departure, p, q, controls, edge):
+def begin_pair(medium, steering, position, departure, p, q, controls, edge):
     """Fill in a pair's candidate controls, and why there is no edge so far; returns how many there are."""
     polar, integration = medium.polar, medium.integration
     x_p, y_p, z_p = position[p]
@@ -180,7 +180,7 @@ def _launch(medium, steering, position, departure, source, indptr, target, contr
                 return False
             p, k = source[at[SOURCE]], at[TARGET]
             at[NEXT] = 0
-            at[COUNT] = _begin_pair(medium, steering, position, departure, p, target[k], controls, edges[k])
+            at[COUNT] = begin_pair(medium, steering, position, departure, p, target[k], controls, edges[k])
             continue
         p, k = source[at[SOURCE]], at[TARGET]
         x, y, z = position[p]
@@ -202,7 +202,7 @@ def _launch(medium, steering, position, departure, source, indptr, target, contr
         lanes[CLOSES, n] = min(float(integration.steps), math.floor(final / dt) + 1.0)
         lanes[SLACK, n] = math.hypot(c.u, c.v) * (lanes[CLOSES, n] * dt - first) + integration.tolerance
         lanes[MISS, n], lanes[DURATION, n] = math.inf, math.inf
-        if _out_of_reach(medium, lanes, n):
+        if lanes[OPENS, n] >= lanes[CLOSES, n] or _out_of_reach(medium, lanes, n):
             continue
         lanes[H, n] = lanes[LAST, n] = dt
         _fly_on(lanes, n)

@@ -45,8 +45,7 @@ def _lerp(builder, low, high, weight):
     return builder.call(fma, [_shuffled(builder, one, [0] * kind.count), builder.fsub(high, low), low])
 
 
-@intrinsic
-def _pair_between(typing_context, values, cell, weight):
+def _in_registers(typing_context, values, cell, weight):
     def generate(context, builder, signature, arguments):
         layout, axes = signature.args[0].layout, signature.args[0].ndim - 1
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
@@ -64,12 +63,15 @@ def _pair_between(typing_context, values, cell, weight):
         for n in range(axes - 1):
             half = len(rows) // 2
             rows = [_lerp(builder, rows[m], rows[m + half], weights[n]) for m in range(half)]
-        ends = (_shuffled(builder, rows[0], lanes) for lanes in ([0, 1], [2, 3]))
-        pair = _lerp(builder, *ends, weights[-1])
+        low, high = (_shuffled(builder, rows[0], lanes) for lanes in ([0, 1], [2, 3]))
+        pair = _lerp(builder, low, high, weights[-1])
         parts = [builder.extract_element(pair, ir.Constant(_INT, n)) for n in range(2)]
         return context.make_tuple(builder, signature.return_type, parts)
 
     return types.UniTuple(types.float64, 2)(values, cell, weight), generate
+
+
+_pair_between: Any = intrinsic(_in_registers)
 
 
 @overload(pair_between, inline="always", jit_options=BARE)

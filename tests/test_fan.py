@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.edges import FlowMapMethod
+from glider_stream.edges import FlowMapMethod, StreamlineMethod
 from glider_stream.flow import sample_flow
+from glider_stream.neighbours import as_csr
 from glider_stream.threads import threads
 
 CONNECTED, TIME, ANGLE, HEADING, SPEED, MISS = 0, 1, 3, 4, 5, 6
@@ -86,3 +87,24 @@ def test_threads_change_no_bit(judge, position):
         two = judge.reach(position, 0.0, np.arange(120), 0)
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_the_refined_line_meets_its_targets(evaluator, judge, position):
+    source, targets = np.arange(20), [np.flatnonzero(position[:, 2] != position[n, 2])[::-1] for n in range(20)]
+    asked = source, *as_csr(targets)
+    plain, refined, exact = (
+        one.connect(position, 0.0, *asked)
+        for one in (
+            evaluator(judge.flow, StreamlineMethod),
+            evaluator(judge.flow, lambda candidates: StreamlineMethod(candidates, refine=True)),
+            judge,
+        )
+    )
+    there = refined[:, CONNECTED] == 0
+    assert there.sum() > 2 * (plain[:, CONNECTED] == 0).sum()
+    assert (refined[there, MISS] <= 0.01).all()
+    # it knows a part of what there is, and nothing else
+    assert (exact[there, CONNECTED] == 0).mean() >= 0.99
+    both = there & (exact[:, CONNECTED] == 0)
+    assert (exact[both, TIME] <= refined[both, TIME] + 0.1).mean() >= 0.99
+    assert 0.7 < both.sum() / (exact[:, CONNECTED] == 0).sum() < 1.0
