@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bins import node_bins
 from .flow import is_steady
-from .kernels import control, edges, flow, motion, reach, refine, terrain
+from .kernels import control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
 from .settings import require
@@ -62,7 +62,7 @@ class FlowMapMethod:
     once, and up to `generations` times more where they are bent or folded, so that little depends on either.
     """
 
-    fan: tuple[int, int] = (5, 8)
+    fan: tuple[int, int] = (4, 8)
     generations: int = 3
 
     def __post_init__(self) -> None:
@@ -242,6 +242,28 @@ class Evaluator:
         w = edge.speed * math.sin(edge.glide_angle)
         rows: Array = motion.traced(self.flow, x, y, z, departure, u, v, w, edge.time, self.integration.dt)
         return rows
+
+    def landings(
+        self, start: ArrayLike, height: float, glide_angle: ArrayLike, heading: ArrayLike, departure: float = 0.0
+    ) -> Array:
+        """Where controls from `start` (3,) [m] land at a height [m]: the flow map, x, y (n, 2) [m].
+
+        `glide_angle` (its magnitude) and `heading` [rad] (n,).
+        """
+        x, y, z = (float(value) for value in np.asarray(start, np.float64))
+        require(height != z, f"a control cannot land at its own height; got {height:g} m for both")
+        angles, headings = (np.require(a, np.float64, ["C", "W"]) for a in (glide_angle, heading))
+        direction = control.CLIMB if height > z else control.DIVE
+        where: Array = fan.landings(
+            self.flow, self.polar, direction, x, y, z, departure, height, angles, headings, self.integration.dt
+        )
+        return where
+
+    def control_line(self, start: ArrayLike, goal: ArrayLike, candidates: int, departure: float = 0.0) -> Array:
+        """The pair's controls on its control line: magnitude of the glide angle and heading (n, 2) [rad]."""
+        ends = [float(value) for value in (*np.ravel(start), *np.ravel(goal))]
+        where: Array = edges.line_controls(self._medium, control.Streamline(candidates), *ends, departure)
+        return where
 
     def allowed(self, points: Array, t: float = 0.0) -> NDArray[np.bool_]:
         """Which points (n, 3) [m] lie in the flow and in open water at time t [s]."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from .domain import Point
 from .export import check_export, export_path
 from .query import Path, Planner, load_path
-from .roadmap import Progress, Roadmap, build_roadmap
+from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .settings import require
 from .store import check_output, read_roadmap, write_roadmap
@@ -87,6 +87,34 @@ def plot(
     else:
         route = path if isinstance(path, Path) else load_path(path)
         figure = plot_route(flow, terrain, problem, road.position, route, depths)
+    if output is not None:
+        save_figure(figure, output)
+    return figure
+
+
+def plot_steering(
+    scenario: str | File | Scenario,
+    start: Point,
+    goal: Point,
+    output: str | File | None = None,
+    *,
+    overrides: Sequence[str] = (),
+) -> "Figure":
+    """Draw how legs are found from one point: its flow map at the goal's depth, and what each method finds.
+
+    Points are in the coordinates of the scenario's domain; any method may be chosen there.
+    """
+    from .plot import check_figure, plot_steering, save_figure
+
+    if output is not None:
+        check_figure(output)
+    resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
+    problem = resolved.problem()
+    ends = [resolved.domain.point(end) for end in (start, goal)]
+    for end, name in zip(ends, ("start", "goal"), strict=True):
+        problem.check_point(end, name)
+    require(ends[0][2] != ends[1][2], "start and goal lie at the same depth; a leg changes it")
+    figure = plot_steering(problem, node_positions(problem), *ends)
     if output is not None:
         save_figure(figure, output)
     return figure

@@ -152,6 +152,15 @@ def begin_pair(medium, steering, position, departure, p, q, controls, edge):
     return max(count, 0)
 
 
+@entry_point()
+def line_controls(medium, steering, x_p, y_p, z_p, x_q, y_q, z_q, t):
+    """The candidate controls of one pair, for callers from Python: angle's magnitude and heading (n, 2) [rad]."""
+    controls = np.empty((steering.candidates, 2))
+    ends = np.array([[x_p, y_p, z_p], [x_q, y_q, z_q]])
+    count = begin_pair(medium, steering, ends, np.full(2, t), 0, 1, controls, np.empty(7))
+    return controls[:count]
+
+
 @kernel
 def _out_of_reach(medium, lanes, n):
     """Whether the flow, at its fastest, can no longer carry lane n to its target in time."""

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .cache import inlined, kernel, making
+from .cache import entry_point, inlined, kernel, making
 from .control import angle_of_vertical_speed, glide_speed, vertical_speed
-from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, place, rest
+from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, hangar, place, rest
 from .flow import Array
 from .motion import LANES, W, X, Y, Z
 
@@ -32,8 +32,6 @@ ALONG_ANGLE, ALONG_HEADING = 4, 5
 _VERTEX, _LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
 FAN_ROWS = FLIGHT_ROWS + 2
 MAX_LEVELS = 32
-HORIZON_ROWS = 4
-"""Levels whose shallowest possible glide is a row of the mesh."""
 BENT = 8.0
 """A cell whose middle lies this far [m] from its linear image is halved."""
 MARGIN = 0.35
@@ -91,34 +89,22 @@ def layers_outward(bins, z, outward, deepest, levels, layers):
 
 
 @kernel
-def fan_rows(steering, polar, direction, rises, horizon, rows):
-    """Glide angles of the base mesh's rows, rising, into `rows`; their number, 0 where no level is in reach.
+def fan_rows(polar, direction, nearest, horizon, rows):
+    """Glide angles of the coarsest mesh's rows, rising, into `rows`; False where no level is in reach.
 
-    `rises` [m]: how far each level lies above or below. Even steps over the angles that reach the first
-    level, and the shallowest that reaches some of the others.
+    From the shallowest that rises or sinks `nearest` [m] within the horizon [s], in even ratios of the vertical
+    speed: so a row that just misses a level in time is late by one ratio at most.
     """
-    shallow = angle_of_vertical_speed(polar, direction, rises[0] / horizon)
-    if math.isnan(shallow):
-        return 0
+    shallow = angle_of_vertical_speed(polar, direction, nearest / horizon)
     steep = polar.steepest[direction]
-    filled = steering.angles
-    for n in range(filled):
-        rows[n] = shallow + (steep - shallow) * n / (steering.angles - 1)
-    extra = min(HORIZON_ROWS, rises.size - 1)
-    for n in range(extra):
-        angle = angle_of_vertical_speed(polar, direction, rises[1 + n * (rises.size - 1) // extra] / horizon)
-        place = filled
-        while place > 0 and rows[place - 1] > angle:
-            place -= 1
-        if math.isnan(angle) or place == 0 or angle - rows[place - 1] < 1e-9:
-            continue
-        if place < filled and rows[place] - angle < 1e-9:
-            continue
-        for m in range(filled, place, -1):
-            rows[m] = rows[m - 1]
-        rows[place] = angle
-        filled += 1
-    return filled if steep > shallow else 0
+    if not shallow < steep:
+        return False
+    slow, fast = vertical_speed(polar, direction, shallow), vertical_speed(polar, direction, steep)
+    last = rows.size - 1
+    rows[0], rows[last] = shallow, steep
+    for n in range(1, last):
+        rows[n] = angle_of_vertical_speed(polar, direction, slow * (fast / slow) ** (n / last))
+    return True
 
 
 @kernel
@@ -154,6 +140,20 @@ def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, la
             else:
                 rest(lanes, n)
                 flying -= 1
+
+
+@entry_point()
+def landings(flow, polar, direction, x, y, z, t, height, angle, heading, dt):
+    """Where controls of magnitude `angle` (n,) and `heading` (n,) [rad] land at a height [m]: x, y (n, 2) [m]."""
+    vertex = np.ones((angle.size, 3))
+    vertex[:, 0], vertex[:, 1] = angle, heading
+    landing = np.empty((angle.size, 2))
+    first = np.int64(0)
+    land_on_levels(
+        flow, polar, direction, x, y, z, t, np.array([height]), vertex, first, angle.size, dt, landing,
+        hangar(FAN_ROWS),
+    )  # fmt: skip
+    return landing
 
 
 @kernel
@@ -378,14 +378,11 @@ def fan_guesses(
     if reached == 0:
         return guesses, count
     levels = levels[:reached]
-    rows = np.empty(steering.angles + HORIZON_ROWS)
-    rises = np.abs(levels - z)
-    if not bins.aligned:
-        # the nodes of the first layer may lie as near as they like
-        rises[0] = 0.0
-    row_count = fan_rows(steering, polar, direction, rises, horizon, rows)
-    if row_count == 0:
+    rows = np.empty(steering.angles)
+    # between levels, the nodes of the first layer may lie as near as they like
+    if not fan_rows(polar, direction, abs(levels[0] - z) if bins.aligned else 0.0, horizon, rows):
         return guesses, count
+    row_count = rows.size
 
     # the finest mesh there may be, as a lattice: which vertex lies where, -1 where none does
     unit = 2 << steering.generations
@@ -394,7 +391,8 @@ def fan_guesses(
     cells = np.empty((row_count * steering.headings, 4), np.int64)
     waiting = 0
     for i in range(row_count - 1):
-        furthest = vertical_speed(polar, direction, rows[i]) * horizon * (1.0 + 1e-9)
+        # a cell takes part where its steeper row is in time; the other flies on for a ratio longer
+        furthest = vertical_speed(polar, direction, rows[i + 1]) * horizon * (1.0 + 1e-9)
         through = 0
         while through < reached and abs(levels[through] - z) <= furthest:
             through += 1

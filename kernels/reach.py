@@ -19,6 +19,8 @@ MAX_TRIES = 12
 """Guesses that are polished for one node."""
 FAN_STEP = 3.0
 """Steps of a fan, in steps of a leg: it gives first guesses."""
+LATEST = 1.1
+"""A guess that arrives later, in deadlines, is not polished."""
 INSIDE = 1e-9
 """A guess this little outside its triangle is inside."""
 ORIGIN, DIRECTION, DEADLINE, DONE = range(4)
@@ -60,6 +62,7 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
     nodes = position.shape[0]
     key = np.empty(count)
     time = np.empty(count)
+    late = 0
     for n in range(count):
         task = tasks[int(guesses[n, TASK])]
         rise = abs(position[int(guesses[n, NODE]), 2] - origin[int(task[ORIGIN]), 2])
@@ -67,7 +70,11 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
         outside = guesses[n, OUTSIDE]
         rank = time[n] / (4.0 * task[DEADLINE]) if outside <= INSIDE else 0.5 + 0.5 * min(outside, 0.9)
         key[n] = guesses[n, TASK] * nodes + guesses[n, NODE] + min(rank, 0.99)
+        if time[n] > LATEST * task[DEADLINE]:
+            key[n] = math.inf
+            late += 1
     order = ranks(key)
+    count -= late
     begin = np.empty(count + 1, np.int64)
     groups = 0
     for n in range(count):

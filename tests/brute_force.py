@@ -11,8 +11,8 @@ from glider_stream.kernels.motion import rk4_step
 
 
 @njit
-def land(flow, polar, direction, x, y, z, z_q, angle, heading, dt):
-    """Where and when a control lands at a depth: x, y [m], t [s]."""
+def land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
+    """Where and when a control, left at t [s], lands at a depth: x, y [m], duration [s]."""
     speed = glide_speed(polar, direction, angle)
     u = speed * math.cos(angle) * math.cos(heading)
     v = speed * math.cos(angle) * math.sin(heading)
@@ -21,24 +21,24 @@ def land(flow, polar, direction, x, y, z, z_q, angle, heading, dt):
     n = 0
     while n * dt < duration:
         step = min(dt, duration - n * dt)
-        x, y = rk4_step(flow, x, y, z + n * dt * w, n * dt, u, v, w, step)
+        x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, step)
         n += 1
     return x, y, duration
 
 
 @njit
-def newton(flow, polar, direction, x, y, z, x_q, y_q, z_q, angle, heading, dt, horizon):
+def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt, horizon):
     """Travel time of the solution that damped Newton steps lead to [s]; inf where they do not close in."""
     low, high = polar.shallowest[direction], polar.steepest[direction]
     for _ in range(30):
-        x_0, y_0, duration = land(flow, polar, direction, x, y, z, z_q, angle, heading, dt)
+        x_0, y_0, duration = land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt)
         off_x, off_y = x_0 - x_q, y_0 - y_q
         miss = math.hypot(off_x, off_y)
         if miss < 0.002:
             return duration if duration <= horizon else math.inf
         e = 1e-5 if angle + 1e-5 < high else -1e-5
-        x_a, y_a, _ = land(flow, polar, direction, x, y, z, z_q, angle + e, heading, dt)
-        x_h, y_h, _ = land(flow, polar, direction, x, y, z, z_q, angle, heading + 1e-5, dt)
+        x_a, y_a, _ = land(flow, polar, direction, x, y, z, z_q, t, angle + e, heading, dt)
+        x_h, y_h, _ = land(flow, polar, direction, x, y, z, z_q, t, angle, heading + 1e-5, dt)
         a, c, b, d = (x_a - x_0) / e, (y_a - y_0) / e, (x_h - x_0) / 1e-5, (y_h - y_0) / 1e-5
         det = a * d - b * c
         if det == 0.0:
@@ -48,7 +48,7 @@ def newton(flow, polar, direction, x, y, z, x_q, y_q, z_q, angle, heading, dt, h
         for _ in range(8):
             next_angle = min(max(angle + share * turn_a, low), high)
             next_heading = heading + share * turn_h
-            x_n, y_n, _ = land(flow, polar, direction, x, y, z, z_q, next_angle, next_heading, dt)
+            x_n, y_n, _ = land(flow, polar, direction, x, y, z, z_q, t, next_angle, next_heading, dt)
             if math.hypot(x_n - x_q, y_n - y_q) < miss:
                 break
             share *= 0.5
@@ -58,38 +58,67 @@ def newton(flow, polar, direction, x, y, z, x_q, y_q, z_q, angle, heading, dt, h
     return math.inf
 
 
-@entry_point()
-def fastest_legs(flow, polar, position, source, target, angles, headings, dt, horizon):
-    """Least travel time of every pair (source, target) [s], inf where none is found: (sources, targets)."""
+@njit
+def scan(flow, polar, direction, position, source, target, t, angles, headings, dt):
+    """Distance [m] from each target of all controls' landings at its depth: (targets, angles, headings).
+
+    One flight a control: what `land` does, for all targets on its way, as long as it takes to get there.
+    """
+    low, high = polar.shallowest[direction], polar.steepest[direction]
+    order = np.argsort(np.abs(position[target, 2] - position[source, 2]))
+    off = np.empty((target.size, angles, headings))
+    for i in range(angles):
+        angle = low + (high - low) * i / (angles - 1)
+        speed = glide_speed(polar, direction, angle)
+        w = (2.0 * direction - 1.0) * speed * math.sin(angle)
+        for j in range(headings):
+            heading = 2 * math.pi * j / headings
+            u = speed * math.cos(angle) * math.cos(heading)
+            v = speed * math.cos(angle) * math.sin(heading)
+            x, y, z = position[source]
+            n = 0
+            for k in order:
+                x_q, y_q, z_q = position[target[k]]
+                duration = (z_q - z) / w
+                while (n + 1) * dt <= duration:
+                    x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, dt)
+                    n += 1
+                x_1, y_1 = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, duration - n * dt)
+                off[k, i, j] = math.hypot(x_1 - x_q, y_1 - y_q)
+    return off
+
+
+@njit
+def is_lowest(off, i, j):
+    """Whether a control lands no further off than those beside it."""
+    angles, headings = off.shape
+    for di in range(-1, 2):
+        for dj in range(-1, 2):
+            if 0 <= i + di < angles and off[i + di, (j + dj) % headings] < off[i, j]:
+                return False
+    return True
+
+
+@entry_point(nogil=True)
+def fastest_legs(flow, polar, position, source, target, t, angles, headings, dt, horizon):
+    """Least travel time of every pair (source, target), left at t [s]; inf where none is found."""
     best = np.full((source.size, target.size), np.inf)
-    off = np.empty((angles, headings))
     for s in range(source.size):
         x, y, z = position[source[s]]
-        for k in range(target.size):
-            x_q, y_q, z_q = position[target[k]]
-            if z_q == z:
-                continue
-            direction = 1 if z_q > z else 0
+        for direction in range(2):
             low, high = polar.shallowest[direction], polar.steepest[direction]
-            for i in range(angles):
-                for j in range(headings):
-                    angle = low + (high - low) * i / (angles - 1)
-                    x_1, y_1, _ = land(
-                        flow, polar, direction, x, y, z, z_q, angle, 2 * math.pi * j / headings, dt
-                    )
-                    off[i, j] = math.hypot(x_1 - x_q, y_1 - y_q)
-            for i in range(angles):
-                for j in range(headings):
-                    lowest = True
-                    for di in range(-1, 2):
-                        for dj in range(-1, 2):
-                            if 0 <= i + di < angles and off[i + di, (j + dj) % headings] < off[i, j]:
-                                lowest = False
-                    if lowest:
-                        angle = low + (high - low) * i / (angles - 1)
+            there = (position[target, 2] - z) * (2.0 * direction - 1.0) > 0.0
+            column = np.flatnonzero(there)
+            off = scan(flow, polar, direction, position, source[s], target[column], t, angles, headings, dt)
+            for k in range(column.size):
+                x_q, y_q, z_q = position[target[column[k]]]
+                for i in range(angles):
+                    for j in range(headings):
+                        if not is_lowest(off[k], i, j):
+                            continue
+                        angle, heading = low + (high - low) * i / (angles - 1), 2 * math.pi * j / headings
                         found = newton(
-                            flow, polar, direction, x, y, z, x_q, y_q, z_q, angle, 2 * math.pi * j / headings,
-                            dt, horizon,
-                        )  # fmt: skip
-                        best[s, k] = min(best[s, k], found)
+                            flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt, horizon
+                        )
+                        best[s, column[k]] = min(best[s, column[k]], found)
     return best

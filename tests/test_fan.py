@@ -31,7 +31,7 @@ def found(judge, position, source):
 
 def test_finds_what_brute_force_finds(judge, position):
     source, target = np.array([3, 60, 99]), np.arange(120)
-    true = brute_force.fastest_legs(judge.flow, judge.polar, position, source, target, 48, 96, 5.0, 625.0)
+    true = brute_force.fastest_legs(judge.flow, judge.polar, position, source, target, 0.0, 48, 96, 5.0, 625.0)
     legs = np.full(true.shape, np.inf)
     for n, k, row in zip(*found(judge, position, source), strict=True):
         if row[0] == CONNECTED and k in target:
