@@ -62,7 +62,7 @@ class FlowMapMethod:
     once, and up to `generations` times more where they are bent or folded, so that little depends on either.
     """
 
-    fan: tuple[int, int] = (4, 8)
+    fan: tuple[int, int] = (6, 12)
     generations: int = 3
 
     def __post_init__(self) -> None:

@@ -1,10 +1,15 @@
+from itertools import pairwise
+
 import brute_force
 import numpy as np
 import pytest
 import reference
+from small import scenario_file
 
+from glider_stream import planner
 from glider_stream.edges import FlowMapMethod, StreamlineMethod
 from glider_stream.flow import sample_flow
+from glider_stream.kernels.edges import Edge
 from glider_stream.neighbours import as_csr
 from glider_stream.threads import threads
 
@@ -29,13 +34,17 @@ def found(judge, position, source):
     return np.repeat(source, np.diff(indptr)), target, rows
 
 
-def test_finds_what_brute_force_finds(judge, position):
+@pytest.mark.parametrize("on_levels", [True, False], ids=["nodes on levels", "nodes at any depth"])
+def test_finds_what_brute_force_finds(judge, position, on_levels):
+    if not on_levels:
+        position = position + [0.0, 0.0, -1.0] * np.random.default_rng(2).uniform(0, 60, (120, 1))
     source, target = np.array([3, 60, 99]), np.arange(120)
-    true = brute_force.fastest_legs(judge.flow, judge.polar, position, source, target, 0.0, 48, 96, 5.0, 625.0)
+    ends = position, source, target, 0.0
+    true = brute_force.fastest_legs(judge.flow, judge.polar, *ends, 48, 96, 5.0, 625.0)
     legs = np.full(true.shape, np.inf)
     for n, k, row in zip(*found(judge, position, source), strict=True):
-        if row[0] == CONNECTED and k in target:
-            legs[np.flatnonzero(source == n)[0], np.flatnonzero(target == k)[0]] = row[TIME]
+        if row[0] == CONNECTED:
+            legs[np.flatnonzero(source == n)[0], k] = row[TIME]
     exists = np.isfinite(true) | np.isfinite(legs)
     assert exists.sum() > 30
     assert np.isfinite(legs[exists]).mean() >= 0.98
@@ -108,3 +117,50 @@ def test_the_refined_line_meets_its_targets(evaluator, judge, position):
     both = there & (exact[:, CONNECTED] == 0)
     assert (exact[both, TIME] <= refined[both, TIME] + 0.1).mean() >= 0.99
     assert 0.7 < both.sum() / (exact[:, CONNECTED] == 0).sum() < 1.0
+
+
+def test_fans_start_when_their_node_is_left(evaluator, gyre):
+    judge = evaluator(gyre, lambda candidates: FlowMapMethod())
+    rng = np.random.default_rng(8)
+    places = np.column_stack(
+        [rng.uniform(-300, 300, 30), rng.uniform(-150, 150, 30), -100.0 * (np.arange(30) % 2)]
+    )
+    pairs = np.arange(4), np.arange(5) * 30, np.tile(np.arange(30), 4)
+    ends = {}
+    for departure in (0.0, 230.0):
+        rows = judge.connect(places, departure, *pairs)
+        ends[departure] = rows
+        for n in np.flatnonzero(rows[:, 0] == CONNECTED)[::9]:
+            along = rows[n, SPEED] * np.cos(rows[n, ANGLE])
+            c = (
+                along * np.cos(rows[n, HEADING]),
+                along * np.sin(rows[n, HEADING]),
+                rows[n, SPEED] * np.sin(rows[n, ANGLE]),
+            )
+            end = reference.replay(gyre, places[n // 30], c, rows[n, TIME], departure)(rows[n, TIME])
+            assert np.linalg.norm(end - places[pairs[2][n]]) < 0.1
+    assert not np.allclose(ends[0.0][:, TIME], ends[230.0][:, TIME], equal_nan=True)
+
+
+def test_a_node_straight_below_is_a_target_like_any_other(judge):
+    x, y = (side.ravel() for side in np.meshgrid(*2 * [np.linspace(-250, 250, 16)]))
+    top, count = np.zeros(x.size), x.size
+    places = np.vstack([np.column_stack([x, y, top]), np.column_stack([x, y, top - 60.0])])
+    rows = judge.connect(places, 0.0, np.arange(count), np.arange(count + 1), np.arange(count, 2 * count))
+    there = np.flatnonzero(rows[:, 0] == CONNECTED)
+    assert there.size > 3
+    for n in there:
+        path = judge.trace(places[n], Edge(CONNECTED, *rows[n, 1:]), 0.0)
+        np.testing.assert_allclose(path[-1, 1:], places[count + n], atol=0.01)
+
+
+def test_legs_of_a_route_meet(tmp_path):
+    scenario = scenario_file(tmp_path, ('method = "streamline"\ncandidates = 24', 'method = "flow-map"'))
+    path = planner.query(planner.build(scenario))
+    assert len(path.legs) > 1
+    for leg, following in pairwise([*path.legs, None]):
+        assert leg.miss <= 0.01
+        assert np.linalg.norm(leg.trajectory[-1, 1:] - leg.end) <= 0.01
+        if following is not None:
+            np.testing.assert_array_equal(following.trajectory[0, 1:], leg.end)
+            assert following.trajectory[0, 0] == pytest.approx(leg.trajectory[-1, 0])

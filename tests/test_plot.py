@@ -1,20 +1,25 @@
 import re
 import sys
+import tomllib
 from itertools import combinations, pairwise
+from pathlib import Path as FilePath
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
+from small import SCENARIO
 
 from glider_stream import plot
 from glider_stream.errors import InputError
 from glider_stream.kernels.flow import OceanGrid, Vortices, velocity
 from glider_stream.kernels.terrain import OpenWater, Seabed, allowed
 from glider_stream.query import Leg, Path
+from glider_stream.roadmap import node_positions
+from glider_stream.scenario import scenario_from_table
 
-UNIT = re.compile(r"\((m|km|s|min|h|days|m/s|°|count)\)")
+UNIT = re.compile(r"\((m|km|s|min|h|days|m/s|°|degrees|count)\)")
 SIGNATURES = {".png": b"\x89PNG\r\n\x1a\n", ".svg": b"<?xml", ".pdf": b"%PDF-"}
 
 
@@ -98,7 +103,15 @@ def roadmap_of(scene, reach):
     )
 
 
+def steering_scene():
+    problem = scenario_from_table(tomllib.loads(SCENARIO), FilePath()).problem()
+    nodes = node_positions(problem)
+    return plot.plot_steering(problem, nodes, np.array([-150.0, 40.0, 0.0]), np.array([-40.0, 0.0, -75.0]))
+
+
 def draw(name):
+    if name == "steering":
+        return steering_scene()
     scene = ocean_scene() if "ocean" in name else box_scene()
     if "roadmap" in name:
         road = roadmap_of(scene, 12e3 if "ocean" in name else 250.0)
@@ -115,6 +128,7 @@ FIGURES = [
     "route of many legs",
     "roadmap of a box",
     "roadmap of the ocean",
+    "steering",
 ]
 
 

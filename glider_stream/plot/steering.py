@@ -188,7 +188,7 @@ def _draw_controls(
     ax.scatter(
         np.degrees(solved[:, 1]), np.degrees(solved[:, 0]), marker="*", s=230, c="#e0261c", ec="white", zorder=6
     )
-    ax.set(xlabel="Heading through water (degrees, counter-clockwise from east)", ylabel="Glide angle (degrees)")
+    ax.set(xlabel="Heading, counter-clockwise from east (degrees)", ylabel="Glide angle (degrees)")
     ax.set(xlim=(0, 360), ylim=(angle[0], angle[-1]))
     ax.set_title(
         f"(c) Every control's miss of the star; red: the legs, white: the control line\n"
