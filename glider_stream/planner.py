@@ -114,7 +114,7 @@ def plot_steering(
     for end, name in zip(ends, ("start", "goal"), strict=True):
         problem.check_point(end, name)
     require(ends[0][2] != ends[1][2], "start and goal lie at the same depth; a leg changes it")
-    figure = plot_steering(problem, node_positions(problem), *ends)
+    figure = plot_steering(problem, node_positions(problem), ends[0], ends[1])
     if output is not None:
         save_figure(figure, output)
     return figure

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from scipy.optimize import root
 
-from ..edges import Evaluator, FlowMapMethod, StreamlineMethod
+from ..edges import Evaluator, FlowMapMethod, Method, StreamlineMethod
 from ..kernels.control import CLIMB, DIVE
 from ..kernels.edges import Status
 from ..neighbours import AllNodes, as_csr
@@ -65,7 +65,7 @@ def solutions(evaluator: Evaluator, fan: Fan, goal: Array, departure: float) -> 
 
     def off(control: Array) -> Array:
         angle = np.clip(control[:1], fan.angle[0], fan.angle[-1])
-        return evaluator.landings(fan.start, fan.height, angle, control[1:], departure)[0] - goal[:2]
+        return np.asarray(evaluator.landings(fan.start, fan.height, angle, control[1:], departure)[0] - goal[:2])
 
     found: list[Array] = []
     for i, j in zip(*np.nonzero(lowest), strict=True):
@@ -201,7 +201,7 @@ def _draw_found(ax: Any, evaluator: Evaluator, problem: "Problem", position: Arr
     source = thinned(len(position), SOURCES)
     law = AllNodes().among(position, 1.0)
     indptr, target = as_csr([law.of(position[n]) for n in source])
-    methods = {
+    methods: dict[str, Method] = {
         "flow map": FlowMapMethod(),
         f"control line, {CANDIDATES} candidates, refined": StreamlineMethod(CANDIDATES, refine=True),
         f"control line, {CANDIDATES} candidates": StreamlineMethod(CANDIDATES),
