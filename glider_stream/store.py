@@ -67,13 +67,18 @@ def replacing(path: Path) -> Iterator[Path]:
 
 def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
     """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
+    # made in memory: where the disk is full, HDF5 can neither write a file nor close it
+    with h5py.File(Path(path).name, "w", driver="core", backing_store=False) as file:
+        _write(file, roadmap)
+        file.flush()
+        image = file.id.get_file_image()
     try:
-        with replacing(Path(path)) as temporary, h5py.File(temporary, "w") as file:
-            _write(file, roadmap)
-    except (OSError, RuntimeError):
-        # of a full disk HDF5 says, for one, that it cannot decrement a count
+        with replacing(Path(path)) as temporary:
+            temporary.write_bytes(image)
+    except OSError as error:
+        reason = (error.strerror or "it cannot be written").lower()
         room = "make room on its disk, or name another output"
-        raise InputError(f"the roadmap {path} cannot be written whole; {room}") from None
+        raise InputError(f"the roadmap {path} cannot be written whole: {reason}; {room}") from None
 
 
 def _write(file: h5py.File, roadmap: Roadmap) -> None:

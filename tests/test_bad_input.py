@@ -348,11 +348,13 @@ def test_a_full_disk(capsys, place, monkeypatch):
     def full(*arguments, **options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("glider_stream.store._write", full)
+    monkeypatch.setattr("pathlib.Path.write_bytes", full)
     before = everything(place)
     code, out, err = command(capsys, *BUILD)
     assert (code, out) == (2, "")
-    assert err.splitlines()[-1].startswith("glider-stream: the roadmap out.h5 cannot be written whole; make room")
+    assert (
+        "the roadmap out.h5 cannot be written whole: no space left on device; make room" in err.splitlines()[-1]
+    )
     assert everything(place) == before
 
 
