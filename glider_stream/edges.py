@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bins import node_bins
 from .flow import is_steady
-from .kernels import control, edges, fan, flow, motion, reach, refine, terrain
+from .kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
 from .settings import require
@@ -144,8 +144,8 @@ class Evaluator:
         else:
             result = np.empty((targets.size, 7))
             refines = isinstance(self.steering, StreamlineMethod) and self.steering.refine
-            connect = refine.refine_nodes if refines else edges.connect_nodes
-            task = partial(connect, self._medium, self.steering.kernel(), *pairs, result)
+            kernel = refine.refine_nodes if refines else connect.connect_nodes
+            task = partial(kernel, self._medium, self.steering.kernel(), *pairs, result)
             in_parallel(task, sources.size, NODES_AT_ONCE)
         return result
 
@@ -262,7 +262,7 @@ class Evaluator:
     def control_line(self, start: ArrayLike, goal: ArrayLike, candidates: int, departure: float = 0.0) -> Array:
         """The pair's controls on its control line: magnitude of the glide angle and heading (n, 2) [rad]."""
         ends = [float(value) for value in (*np.ravel(start), *np.ravel(goal))]
-        where: Array = edges.line_controls(self._medium, control.Streamline(candidates), *ends, departure)
+        where: Array = connect.line_controls(self._medium, control.Streamline(candidates), *ends, departure)
         return where
 
     def allowed(self, points: Array, t: float = 0.0) -> NDArray[np.bool_]:

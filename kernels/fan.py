@@ -9,51 +9,19 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .cache import entry_point, inlined, kernel, making
+from .cache import entry_point, kernel, making
 from .control import angle_of_vertical_speed, glide_speed, vertical_speed
 from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, hangar, place, rest
-from .flow import Array
 from .motion import LANES, W, X, Y, Z
+from .patch import MAX_LEVELS, fill_patch, guess_in_patch, longer, wants_halving
 
-Index = NDArray[np.int64]
-
-TASK, NODE, ANGLE, HEADING, OUTSIDE, INVERSE = range(6)
-"""Columns of a guess: the task it is for, node, glide angle and heading [rad], how far outside its cell, in the
-cell's own units, and from INVERSE on d(angle, heading) / d(x, y), row by row."""
-GUESS_COLUMNS = 10
 THROUGH = 2
 """Column of a vertex, after its angle and heading: how many levels it flies through."""
 ROW, COLUMN, SIZE, LEVELS = range(4)
 """Columns of a cell: its first corner and its size on the lattice, its levels as bits."""
-ALONG_ANGLE, ALONG_HEADING = 4, 5
-"""Rows of a patch, after the landings of its four corners: its second derivatives, in the cell's own units."""
 _VERTEX, _LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
 FAN_ROWS = FLIGHT_ROWS + 2
-MAX_LEVELS = 32
-BENT = 8.0
-"""A cell whose middle lies this far [m] from its linear image is halved."""
-MARGIN = 0.35
-"""A target this far outside a triangle, in its own units, is a guess where none is inside."""
-
-
-class NodeBins(NamedTuple):
-    """Nodes in bins: layers between rising depth `levels` [m], each a grid of square bins.
-
-    Layer s holds the nodes with levels[s] <= z < levels[s + 1]; bin (s, i, j) holds
-    `node[first[b]:first[b + 1]]`, b = (s * nx + i) * ny + j. `aligned`: every node lies on a level.
-    """
-
-    levels: Array
-    aligned: bool
-    x_lo: float
-    y_lo: float
-    per_bin: float
-    nx: int
-    ny: int
-    first: Index
-    node: Index
 
 
 class FlowMap(NamedTuple):
@@ -168,194 +136,6 @@ def _launch(polar, direction, x, y, z, t, levels, vertex, one, dt, lanes, n):
     fly_for(lanes, n, (levels[0] - z) / w, dt)
 
 
-@inlined
-def _bin_range(low, high, origin, per_bin, count):
-    first = int(min(max((low - origin) * per_bin, 0.0), count - 1.0))
-    last = int(min(max((high - origin) * per_bin, 0.0), count - 1.0))
-    return first, last
-
-
-@kernel
-def any_wanted(bins, layer, position, wanted, x_lo, x_hi, y_lo, y_hi):
-    """Whether a wanted node of the layer lies in the rectangle [m]."""
-    i_first, i_last = _bin_range(x_lo, x_hi, bins.x_lo, bins.per_bin, bins.nx)
-    j_first, j_last = _bin_range(y_lo, y_hi, bins.y_lo, bins.per_bin, bins.ny)
-    for i in range(i_first, i_last + 1):
-        row = (layer * bins.nx + i) * bins.ny
-        for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
-            node = bins.node[k]
-            if not (x_lo <= position[node, 0] <= x_hi and y_lo <= position[node, 1] <= y_hi):
-                continue
-            if wanted.size == 0 or wanted[node]:
-                return True
-    return False
-
-
-@inlined
-def _inside(ax, ay, bx, by, cx, cy, x, y):
-    """(s, r, det) with (x, y) = a + s (b - a) + r (c - a); det 0 where the triangle is flat."""
-    det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    if det == 0.0:
-        return 0.0, 0.0, 0.0
-    s = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / det
-    r = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / det
-    return s, r, det
-
-
-@making
-def longer(rows, needed):
-    """The rows, and empty ones: twice as many, or as many as are needed."""
-    if needed <= rows.shape[0]:
-        return rows
-    grown = np.empty((max(2 * rows.shape[0], needed), rows.shape[1]), rows.dtype)
-    grown[: rows.shape[0]] = rows
-    return grown
-
-
-@kernel
-def _patch(landing, corners, i, j, level, patch):
-    """Quarter (i, j) of a cell at a level: landings of its corners, and its second derivatives.
-
-    `corners` (9,): the vertices of the cell, halved. Of second derivatives the mean of both sides.
-    """
-    for m in range(2):
-        at = 2 * level + m
-        for c in range(4):
-            patch[c, m] = landing[corners[3 * (i + c // 2) + j + c % 2], at]
-        along_angle = 0.0
-        along_heading = 0.0
-        for side in range(2):
-            a, h = j + side, 3 * (i + side)
-            ends = landing[corners[a], at] + landing[corners[a + 6], at]
-            along_angle += ends - 2.0 * landing[corners[a + 3], at]
-            ends = landing[corners[h], at] + landing[corners[h + 2], at]
-            along_heading += ends - 2.0 * landing[corners[h + 1], at]
-        patch[ALONG_ANGLE, m] = 0.5 * along_angle
-        patch[ALONG_HEADING, m] = 0.5 * along_heading
-
-
-@kernel
-def _around(bins, patches):
-    """The rectangle about a patch, and about its start where nodes lie between: x_lo, x_hi, y_lo, y_hi [m]."""
-    x_lo, x_hi, y_lo, y_hi = math.inf, -math.inf, math.inf, -math.inf
-    for end in range(1 if bins.aligned else 2):
-        for c in range(4):
-            x_lo, x_hi = min(x_lo, patches[end, c, 0]), max(x_hi, patches[end, c, 0])
-            y_lo, y_hi = min(y_lo, patches[end, c, 1]), max(y_hi, patches[end, c, 1])
-    return x_lo, x_hi, y_lo, y_hi
-
-
-@kernel
-def _bend(p):
-    """How far [m] a patch is from flat: the greatest distance of its middle lines from its linear image."""
-    x = p[0, 0] - p[1, 0] - p[2, 0] + p[3, 0]
-    y = p[0, 1] - p[1, 1] - p[2, 1] + p[3, 1]
-    twist = 0.25 * math.sqrt(x * x + y * y)
-    along_angle = math.sqrt(p[ALONG_ANGLE, 0] ** 2 + p[ALONG_ANGLE, 1] ** 2) / 8.0
-    return max(twist, along_angle, math.sqrt(p[ALONG_HEADING, 0] ** 2 + p[ALONG_HEADING, 1] ** 2) / 8.0)
-
-
-@kernel
-def _folded(p):
-    """Whether the two triangles of a patch are turned opposite ways."""
-    low = (p[2, 0] - p[0, 0]) * (p[1, 1] - p[0, 1]) - (p[1, 0] - p[0, 0]) * (p[2, 1] - p[0, 1])
-    high = (p[1, 0] - p[3, 0]) * (p[2, 1] - p[3, 1]) - (p[2, 0] - p[3, 0]) * (p[1, 1] - p[3, 1])
-    return low * high <= 0.0
-
-
-@kernel
-def wants_halving(bins, layer, position, wanted, patches):
-    """Whether a patch that is bent or folded has a wanted node within the bend's or the fold's reach."""
-    bend = _bend(patches[0])
-    folded = _folded(patches[0])
-    if bend <= BENT and not folded:
-        return False
-    x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
-    room = max(bend, 0.25 * max(x_hi - x_lo, y_hi - y_lo)) if folded else bend
-    return any_wanted(bins, layer, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
-
-
-@kernel
-def _solve(p, x, y, s, r):
-    """Newton steps from (s, r) towards the point of a patch's quadratic map that is (x, y).
-
-    Returns s, r and the map's derivatives x_s, x_r, y_s, y_r there; s is along the angle, r along the heading.
-    """
-    x_s, x_r, y_s, y_r = 0.0, 0.0, 0.0, 0.0
-    for step in range(3):
-        twist_x = p[3, 0] - p[2, 0] - p[1, 0] + p[0, 0]
-        twist_y = p[3, 1] - p[2, 1] - p[1, 1] + p[0, 1]
-        x_s = p[2, 0] - p[0, 0] + r * twist_x - (0.5 - s) * p[ALONG_ANGLE, 0]
-        y_s = p[2, 1] - p[0, 1] + r * twist_y - (0.5 - s) * p[ALONG_ANGLE, 1]
-        x_r = p[1, 0] - p[0, 0] + s * twist_x - (0.5 - r) * p[ALONG_HEADING, 0]
-        y_r = p[1, 1] - p[0, 1] + s * twist_y - (0.5 - r) * p[ALONG_HEADING, 1]
-        det = x_s * y_r - x_r * y_s
-        if step == 2 or det == 0.0:
-            break
-        a, h = 0.5 * s * (1.0 - s), 0.5 * r * (1.0 - r)
-        off_x = p[0, 0] + s * (p[2, 0] - p[0, 0]) + r * (p[1, 0] - p[0, 0]) + s * r * twist_x - x
-        off_y = p[0, 1] + s * (p[2, 1] - p[0, 1]) + r * (p[1, 1] - p[0, 1]) + s * r * twist_y - y
-        off_x -= a * p[ALONG_ANGLE, 0] + h * p[ALONG_HEADING, 0]
-        off_y -= a * p[ALONG_ANGLE, 1] + h * p[ALONG_HEADING, 1]
-        s -= (y_r * off_x - x_r * off_y) / det
-        r -= (x_s * off_y - y_s * off_x) / det
-    return s, r, x_s, x_r, y_s, y_r
-
-
-@making
-def guess_in_patch(
-    bins, layer, start, end, position, wanted, z, patches, task, angle, da, heading, dh, guesses, count
-):
-    """First guesses for the wanted nodes under a patch of (angle, heading) + (da, dh); returns (guesses, count).
-
-    `patches` (3, 6, 2): the patch at the layer's `end` and at its `start` [m]; the third is scratch.
-    """
-    x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
-    room = MARGIN * max(x_hi - x_lo, y_hi - y_lo)
-    i_first, i_last = _bin_range(x_lo - room, x_hi + room, bins.x_lo, bins.per_bin, bins.nx)
-    j_first, j_last = _bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
-    p = patches[0] if bins.aligned else patches[2]
-    for i in range(i_first, i_last + 1):
-        row = (layer * bins.nx + i) * bins.ny
-        for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
-            node = bins.node[k]
-            x, y = position[node, 0], position[node, 1]
-            if x < x_lo - room or x > x_hi + room or y < y_lo - room or y > y_hi + room:
-                continue
-            f = (position[node, 2] - start) / (end - start)
-            if position[node, 2] == z or f < 0.0 or f > 1.0 or not (wanted.size == 0 or wanted[node]):
-                continue
-            if not bins.aligned:
-                for c in range(6):
-                    for m in range(2):
-                        p[c, m] = patches[1, c, m] + f * (patches[0, c, m] - patches[1, c, m])
-            # lower triangle at corner 0, upper one at corner 3, their legs along angle and heading
-            s, r, low = _inside(p[0, 0], p[0, 1], p[2, 0], p[2, 1], p[1, 0], p[1, 1], x, y)
-            outside = max(0.0, -s, -r, s + r - 1.0) if low != 0.0 else math.inf
-            back_s, back_r, high = _inside(p[3, 0], p[3, 1], p[1, 0], p[1, 1], p[2, 0], p[2, 1], x, y)
-            beyond = max(0.0, -back_s, -back_r, back_s + back_r - 1.0) if high != 0.0 else math.inf
-            if beyond < outside:
-                s, r, outside = 1.0 - back_s, 1.0 - back_r, beyond
-            if outside > MARGIN:
-                continue
-            s_2, r_2, x_s, x_r, y_s, y_r = _solve(p, x, y, s, r)
-            if abs(s_2 - s) + abs(r_2 - r) < 1.0:
-                s, r = s_2, r_2
-            else:
-                x_s, x_r, y_s, y_r = p[2, 0] - p[0, 0], p[1, 0] - p[0, 0], p[2, 1] - p[0, 1], p[1, 1] - p[0, 1]
-            det = x_s * y_r - x_r * y_s
-            if det == 0.0:
-                continue
-            guesses = longer(guesses, count + 1)
-            guess = guesses[count]
-            guess[TASK], guess[NODE], guess[OUTSIDE] = task, node, outside
-            guess[ANGLE], guess[HEADING] = angle + s * da, heading + r * dh
-            guess[INVERSE], guess[INVERSE + 1] = da * y_r / det, -da * x_r / det
-            guess[INVERSE + 2], guess[INVERSE + 3] = -dh * y_s / det, dh * x_s / det
-            count += 1
-    return guesses, count
-
-
 @making
 def fan_guesses(
     medium, steering, bins, position, wanted, task, direction, backward, x, y, z, t, deepest, horizon, dt,
@@ -449,10 +229,10 @@ def fan_guesses(
                 for k in range(reached):
                     if not (cells[c, LEVELS] >> k) & 1:
                         continue
-                    _patch(landing, corners, low, left_of, k, patches[0])
+                    fill_patch(landing, corners, low, left_of, k, patches[0])
                     if not bins.aligned:
                         if k > 0:
-                            _patch(landing, corners, low, left_of, k - 1, patches[1])
+                            fill_patch(landing, corners, low, left_of, k - 1, patches[1])
                         else:
                             patches[1, :, 0], patches[1, :, 1] = x, y
                             patches[1, 4:] = 0.0

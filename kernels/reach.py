@@ -9,10 +9,11 @@ from .cache import entry_point, kernel, making
 from .control import CLIMB, angle_of_vertical_speed, control_towards, horizontal_speed, vertical_speed
 from .cost import edge_cost
 from .edges import BLOCKED, CLEARANCE_SPACING, CONNECTED, NO_HIT, Edge, no_edge, quick_status, store
-from .fan import ANGLE, FAN_ROWS, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, fan_guesses
+from .fan import FAN_ROWS, fan_guesses
 from .flight import LEFT, advance, hangar, stayed_inside, widen
 from .flow import contains
 from .motion import LANES, is_clear, stays_inside
+from .patch import ANGLE, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK
 from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct
 
 MAX_TRIES = 12

@@ -5,22 +5,12 @@ import math
 import numpy as np
 
 from .cache import entry_point, kernel, making
+from .connect import begin_pair
 from .control import CLIMB, DIVE
-from .edges import NO_HIT, begin_pair
-from .fan import (
-    ANGLE,
-    FAN_ROWS,
-    GUESS_COLUMNS,
-    HEADING,
-    INVERSE,
-    NODE,
-    OUTSIDE,
-    TASK,
-    THROUGH,
-    land_on_levels,
-    longer,
-)
+from .edges import NO_HIT
+from .fan import FAN_ROWS, THROUGH, land_on_levels
 from .flight import hangar
+from .patch import ANGLE, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, longer
 from .reach import DEADLINE, DIRECTION, ORIGIN, polish
 from .steer import STEER_ROWS
 

@@ -11,6 +11,7 @@ import reference
 from glider_stream.edges import IntegrationSettings, StreamlineMethod, SurfaceMethod, count_statuses
 from glider_stream.errors import InputError
 from glider_stream.flow import Uniform, Vortex, Vortices, sample_flow
+from glider_stream.kernels.connect import connect_nodes
 from glider_stream.kernels.control import (
     CLIMB,
     DIVE,
@@ -19,7 +20,7 @@ from glider_stream.kernels.control import (
     heading_on_line,
     horizontal_speed,
 )
-from glider_stream.kernels.edges import Status, connect_nodes
+from glider_stream.kernels.edges import Status
 from glider_stream.kernels.flow import velocity
 from glider_stream.kernels.motion import traced
 from glider_stream.kernels.terrain import Seabed, allowed

@@ -13,7 +13,8 @@ FLOORS = {
     0: "kernels.cache kernels.interpolate kernels.flow kernels.cost kernels.terrain",
     1: "kernels.stream kernels.motion",
     2: "kernels.control",
-    3: "kernels.flight kernels.fan kernels.steer kernels.edges kernels.reach kernels.refine"
+    3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
+    " kernels.refine"
     " errors settings threads",
     4: "bins glider flow domain frame ocean ocean_flow terrain",
     5: "sampling neighbours edges legs",
