@@ -45,7 +45,7 @@ ARITHMETIC: dict[str, Any] = {"error_model": "numpy"}
 """A division by zero gives inf or NaN: raising would put a branch beside each one."""
 BARE: Any = ARITHMETIC | {"_nrt": False}
 """For kernels that make no array. Numba otherwise counts references to every array of a flow at every call, with
-instructions that make the threads wait for each other: 6 times the cost of a look at a flight."""
+instructions that make the threads wait for each other: without them a look at a flight costs a third."""
 
 making = njit(**ARITHMETIC | {"_nrt": True})
 """Compiles a kernel that makes an array."""
