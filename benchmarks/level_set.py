@@ -1,28 +1,35 @@
 """A bound below every travel time of a scenario: the time-optimal path, by a level-set method.
 
 No route of legs can be faster than a glider whose glide angle and heading may change at every instant. The
-set that such a glider can have reached is a front; the Hamilton-Jacobi equation V_t + max over the controls
-of f . grad V = 0 moves it, with f = (u + Vh cos heading, v + Vh sin heading, ±w) and (Vh, w) on the glide
-polar. hj-reachability solves that (WENO5, local Lax-Friedrichs, TVD Runge-Kutta 3). Nothing here reads
-the project's legs, edges or steering: only the flow, the polar and the two points.
+set that such a glider can have reached is a front; V_t + max over the controls of f . grad V = 0 moves it,
+with f = (u + Vh cos heading, v + Vh sin heading, ±w) and (Vh, w) on the glide polar or between two of its
+points. hj-reachability solves that (WENO5, local Lax-Friedrichs, TVD Runge-Kutta 3). Nothing here reads the
+project's legs, edges or steering: only the flow as the planner reads it, the polar and the two points.
 
-- Start. V(., 0) is the time tau [s] that a glider in still water needs from the start, so that V(goal, t) = tau
-  is the first touching of the goal by a front begun at all points within tau of the start: t is a bound below,
-  t + tau the arrival time as tau falls to 0. One run gives all tau; below three cells the numbers are smeared.
-  V is kept as sqrt(tau^2 + SOFT^2) - SOFT, which moves alike and has no tip.
-- Surface and floor. The field goes on beyond both as its mirror image. A path there, folded back, dives
-  where it climbed: with a polar that is the same for both (else the faster of the two is taken for both, still
-  a bound below) the fold is a path within the depths, so the mirror is exact. It lets gliders slide along the
-  surface and hold a depth, at the best horizontal speed: what dives and climbs of no length come to.
-- Sides. The front may leave the flow's box and return (slopes go on): a bound below.
-- Check from above. The best path, traced back through the coarsest run, becomes a first guess of headings
-  and vertical speeds, changed at even times, and SLSQP shortens it: a path that arrives, in the same flow by
-  another method. The optimum lies below its time.
+- Start. V(., 0) is the time tau [s] that a glider in still water needs from the start, as sqrt(tau^2 + SOFT^2)
+  - SOFT, which moves alike and has no tip. V(goal, t) tells the tau for which a glider begun somewhere within
+  tau of the start first reaches the goal at t. A glider from the start itself needs tau / (1 + m / Vh) or more
+  to get out of there, m the greatest current within tau, Vh the greatest horizontal speed, and t from then on:
+  t + tau / (1 + m / Vh) is a bound below. One run gives every tau; large ones bound loosely, and within four
+  cells or so the front is smeared and late.
+- Either end. The front may as well begin at the goal, in the opposite flow. The runs that count begin at the
+  end with the smaller m; all grids but the finest are run from the other end too, as a check.
+- Surface and floor. The field goes on beyond both as its mirror image. A path there, folded back, dives where
+  it climbed, which a polar alike in both allows (else the script refuses): the mirror is exact. It lets gliders
+  slide along the surface and hold a depth at the best horizontal speed, as dives and climbs of no length do.
+- Sides. Nothing comes in through the sides of the flow's box, and no leg may leave it.
+- Grids. Their nodes should be among those of a sampled flow or halve its cells, or the scheme sees another flow.
+- From above. The best path, traced through the first run, becomes a first guess of headings and vertical
+  speeds, changed at even times, and SLSQP shortens it: a path that arrives, flown by RK4 in the same flow.
 
-A route's legs may end as far from their node as the tolerance, and gain that much way on this bound.
+So every error but the scheme's own puts the bound below the optimum. `error_s` estimates the scheme's and
+proves nothing: the most of what the finest grid differs by from the next and between tau, what the ends differ
+by on the finest grid run from both, and what the finest grid is above the path that arrives. `bound_s` is the
+finest grid's bound less that. A leg that ends short of its node by up to the tolerance gains as much way on it;
+flow-map legs end within 0.01 m.
 
-It needs an environment of its own (JAX): python -m venv hj; hj/bin/pip install hj-reachability -e .
-Then: hj/bin/python benchmarks/level_set.py data/seed-box.toml -o benchmarks/records/level_set_seed_box.json
+It needs an environment of its own (JAX): python -m venv hj; hj/bin/pip install hj-reachability scipy -e .
+Then: hj/bin/python benchmarks/level_set.py seed-box -o benchmarks/records/level_set_seed_box.json
 """
 
 import argparse
@@ -41,7 +48,7 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 import hj_reachability as hj
 import jax.numpy as jnp
 import numpy as np
-from hj_reachability import boundary_conditions
+from hj_reachability.boundary_conditions import extrapolate_away_from_zero
 from numba import njit
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import map_coordinates
@@ -49,52 +56,79 @@ from scipy.optimize import minimize
 
 from glider_stream.errors import InputError
 from glider_stream.flow import is_steady
-from glider_stream.kernels.flow import velocities, velocity
+from glider_stream.kernels.flow import velocities
+from glider_stream.kernels.motion import rk4_step
 from glider_stream.roadmap import Problem
 from glider_stream.scenario import read_scenario
 from glider_stream.settings import require
 
-GRIDS = ("61,61,31", "81,81,41", "101,101,51", "121,121,61")
-TAUS = (160.0, 120.0, 100.0, 80.0, 60.0)
-"""Sizes [s] of the set that the front begins at; the arrival is read at HEADLINE, the others tell its error."""
-HEADLINE = 80.0
+GRIDS = ("51,51,31", "101,101,61", "201,201,61")
+TAUS = (40, 60, 80, 100)
+"""Sizes [s] of the set that the front begins at; the bound is read at TAU."""
+TAU = 60
 SOFT = 60.0
 STEP = 4.0
 """Between readings [s]; the solver's own steps are shorter."""
-SLOPES = 256
-PIECES = 60
-"""Controls of the path that is shortened."""
+SLOPES = 512
+PIECES = 80
+"""Controls of the path from above."""
 
 
-class Wing:
-    """What the polar allows: `support` over slopes, and the hull's edge, `level` [m/s] at |w| `sink` [m/s]."""
+class Waters:
+    """What the bound reads of a problem: flow, two ends, box [m], and the polar's hull.
+
+    `support` (SLOPES + 1,) is the greatest (1 - a) Vh + a w [m/s] for a from 0 to 1; `sink`, `level` are the
+    hull's edge, the greatest Vh [m/s] at |w|.
+    """
 
     def __init__(self, problem: Problem) -> None:
-        polar = problem.evaluator.polar
-        angle = np.linspace(polar.shallowest, polar.steepest, polar.speed.shape[1], axis=1)
-        level, sink = polar.speed * np.cos(angle), polar.speed * np.sin(angle)
-        self.symmetric = bool(np.allclose(level[0], level[1]) and np.allclose(sink[0], sink[1]))
-        self.fastest, self.steepest = float(level.max()), float(sink.max())
-        # support at (1 - a, a): convex in a, so that the table, linear between, errs towards faster
-        a = np.linspace(0.0, 1.0, SLOPES + 1)
-        self.support = np.array([((1 - s) * level + s * sink).max() for s in a])
-        best = level[0].argmax()
-        self.sink = np.concatenate([[0.0], sink[0, best:]])
-        self.level = np.concatenate([level[0, best : best + 1], level[0, best:]])
+        flow, polar = problem.evaluator.flow, problem.evaluator.polar
+        require(problem.start is not None, "the scenario has no [query]: it names the start and the goal")
+        require(is_steady(flow), "the flow changes with time; this script takes steady flows")
+        require(bool(np.allclose(*polar.speed)), "the glider dives and climbs by different polars")
+        self.flow, self.departure = flow, problem.departure
+        self.ends = np.array(problem.start, float), np.array(problem.goal, float)
+        self.lo = np.array([flow.x_lo, flow.y_lo, problem.lo[2]])
+        self.hi = np.array([flow.x_hi, flow.y_hi, problem.hi[2]])
+        borders = bool(np.isfinite([self.lo, self.hi]).all())
+        require(borders, "the flow has no borders; give `flow.x` and `flow.y`")
+        knots = np.linspace(polar.shallowest[0], polar.steepest[0], polar.speed.shape[1])
+        angle = np.linspace(knots[0], knots[-1], 20_001)
+        speed = np.interp(angle, knots, polar.speed[0])
+        level, sink = speed * np.cos(angle), speed * np.sin(angle)
+        self.fastest, self.steepest, best = float(level.max()), float(sink.max()), level.argmax()
+        # convex in a: the table, linear between, errs towards faster
+        self.share = np.linspace(0.0, 1.0, SLOPES + 1)
+        self.support = np.array([((1 - a) * level + a * sink).max() for a in self.share])
+        self.sink, self.level = np.r_[0.0, sink[best:]], np.r_[level[best], level[best:]]
 
-    def still_water_time(self, horizontal: np.ndarray, vertical: np.ndarray) -> np.ndarray:
-        """Time [s] over distances [m] in still water, holding depth allowed."""
-        result = np.zeros_like(horizontal)
-        for a, support in zip(np.linspace(0.0, 1.0, SLOPES + 1), self.support, strict=True):
-            result = np.maximum(result, ((1 - a) * horizontal + a * vertical) / support)
+    def current(self, at: np.ndarray) -> np.ndarray:
+        """Current (u, v) [m/s] at points (..., 3)."""
+        x, y, z = np.ascontiguousarray(at.reshape(-1, 3).T, dtype=np.float64)
+        uv = velocities(self.flow, x, y, z, np.full(x.size, self.departure))
+        return np.asarray(uv).reshape(*at.shape[:-1], 2)
+
+    def still_water_time(self, away: np.ndarray) -> np.ndarray:
+        """Time [s] over distances (..., 3) [m] in still water."""
+        across, along = np.hypot(away[..., 0], away[..., 1]), np.abs(away[..., 2])
+        result = np.zeros_like(across)
+        for a, support in zip(self.share, self.support, strict=True):
+            result = np.maximum(result, ((1 - a) * across + a * along) / support)
         return result
+
+    def quickening(self, end: np.ndarray, tau: float) -> float:
+        """1 + m / Vh, m the greatest current within `tau` [s] of an end."""
+        reach = tau * np.array([self.fastest, self.fastest, self.steepest])
+        away = np.stack(np.meshgrid(*(np.linspace(-r, r, 61) for r in reach), indexing="ij"), axis=-1)
+        at = np.clip(end + away[self.still_water_time(away) <= 1.05 * tau], self.lo, self.hi)
+        return 1.0 + float(np.linalg.norm(self.current(at), axis=-1).max()) / self.fastest
 
 
 class Glide(hj.dynamics.Dynamics):
     """The library's view of a glider in a flow; a state is x, y, z and the current u, v there."""
 
-    def __init__(self, wing: Wing) -> None:
-        self.support, self.most = jnp.asarray(wing.support), (wing.fastest, wing.steepest)
+    def __init__(self, waters: Waters) -> None:
+        self.support, self.most = jnp.asarray(waters.support), (waters.fastest, waters.steepest)
 
     def __call__(self, state: Any, control: Any, disturbance: Any, time: Any) -> Any:
         """Not needed: the Hamiltonian is given."""
@@ -103,7 +137,7 @@ class Glide(hj.dynamics.Dynamics):
     optimal_control_and_disturbance = __call__
 
     def hamiltonian(self, state: Any, time: Any, value: Any, grad_value: Any) -> Any:
-        """u p_x + v p_y + max over the glide angle of Vh |p_xy| + w |p_z|."""
+        """u p_x + v p_y + max over the hull of Vh |p_xy| + w |p_z|."""
         across, along = jnp.hypot(grad_value[0], grad_value[1]), jnp.abs(grad_value[2])
         size = across + along
         at = SLOPES * along / jnp.maximum(size, 1e-20)
@@ -123,207 +157,175 @@ def mirror(values: Any, width: int) -> Any:
     return jnp.pad(values, ((width, width),), mode="reflect")
 
 
-def currents(problem: Problem, at: np.ndarray) -> np.ndarray:
-    """Current (u, v) [m/s] at points (n, 3)."""
-    x, y, z = np.ascontiguousarray(at.T, dtype=np.float64)
-    return np.asarray(velocities(problem.evaluator.flow, x, y, z, np.full(len(at), problem.departure)))
-
-
-def box(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Corners [m]: the flow's box, the domain's depths."""
-    flow = problem.evaluator.flow
-    return np.array([flow.x_lo, flow.y_lo, problem.lo[2]]), np.array([flow.x_hi, flow.y_hi, problem.hi[2]])
-
-
 class Front:
-    """One run: `arrivals`, for each of TAUS the first touching [s]; `frames`, V at every STEP, if kept."""
+    """One run, from the start or, `backwards`, from the goal; `frames`, V at every STEP, if kept.
 
-    def __init__(self, problem: Problem, wing: Wing, shape: tuple[int, ...], latest: float, keep: bool) -> None:
+    By tau [s]: `touch`, when the far end is first touched; `bound`, below the travel time.
+    """
+
+    def __init__(
+        self, waters: Waters, shape: tuple[int, ...], backwards: bool, latest: float, keep: bool
+    ) -> None:
         began = time.perf_counter()
-        self.shape, (lo, hi) = shape, box(problem)
-        sides = (boundary_conditions.extrapolate_away_from_zero,) * 2 + (mirror,)
-        grid = hj.Grid.from_lattice_parameters_and_boundary_conditions(hj.sets.Box(lo, hi), shape, sides)
-        self.axes = [np.linspace(a, b, n) for a, b, n in zip(lo, hi, shape, strict=True)]
-        nodes = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        uv = jnp.asarray(currents(problem, nodes).reshape(*shape, 2), grid.states.dtype)
+        self.shape, self.backwards = shape, backwards
+        self.source, self.far = waters.ends[::-1] if backwards else waters.ends
+        sides = (extrapolate_away_from_zero, extrapolate_away_from_zero, mirror)
+        box = hj.sets.Box(waters.lo, waters.hi)
+        grid = hj.Grid.from_lattice_parameters_and_boundary_conditions(box, shape, sides)
+        self.axes = [np.linspace(a, b, n) for a, b, n in zip(waters.lo, waters.hi, shape, strict=True)]
+        nodes = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
+        uv = jnp.asarray(waters.current(nodes) * (-1 if backwards else 1), grid.states.dtype)
         grid = grid.replace(states=jnp.concatenate([grid.states, uv], axis=-1))
-        away = nodes - np.asarray(problem.start)
-        tau = wing.still_water_time(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
-        values = jnp.asarray((np.hypot(tau, SOFT) - SOFT).reshape(shape), grid.states.dtype)
+        tau = waters.still_water_time(nodes - self.source)
+        values = jnp.asarray(np.hypot(tau, SOFT) - SOFT, grid.states.dtype)
         settings = hj.SolverSettings.with_accuracy(
             "very_high", artificial_dissipation_scheme=hj.artificial_dissipation.local_local_lax_friedrichs
         )
-        dynamics, now, left = Glide(wing), 0.0, math.inf
-        self.frames, self.arrivals = [np.asarray(values)] if keep else [], dict.fromkeys(TAUS, math.nan)
-        while left > min(TAUS) / (4 if keep else 1) and now < latest:
+        dynamics, now, left = Glide(waters), 0.0, math.inf
+        self.frames, self.touch = [np.asarray(values)] if keep else [], dict.fromkeys(TAUS, math.nan)
+        # the path needs frames until the front has arrived
+        while left > (5 if keep else min(TAUS)) and now < latest:
             values = hj.step(settings, dynamics, grid, now, values, now + STEP, progress_bar=False)
-            now, before, left = now + STEP, left, self._tau(np.asarray(values), problem.goal)
+            now, before, left = now + STEP, left, self._tau(np.asarray(values))
             for one in TAUS:
                 if left <= one < before:
-                    self.arrivals[one] = now - STEP * (one - left) / (before - left)
+                    self.touch[one] = now - STEP * (one - left) / (before - left)
             if keep:
                 self.frames.append(np.asarray(values))
+        self.bound = {t: at + t / waters.quickening(self.source, t) for t, at in self.touch.items()}
         self.wall = time.perf_counter() - began
 
-    def _tau(self, values: np.ndarray, at: Any) -> float:
-        """tau [s] at a point: cubic in the nodes around it, 0 where the front has passed."""
-        place = [(c - axis[0]) / (axis[1] - axis[0]) for c, axis in zip(at, self.axes, strict=True)]
+    def _tau(self, values: np.ndarray) -> float:
+        """tau [s] at the far end, cubic in the nodes around it; 0 where V has sunk below its least value."""
+        place = [(c - axis[0]) / (axis[1] - axis[0]) for c, axis in zip(self.far, self.axes, strict=True)]
         first = [min(max(int(p) - 5, 0), n - 12) for p, n in zip(place, self.shape, strict=True)]
         patch = values[tuple(slice(f, f + 12) for f in first)].astype(np.float64)
         value = map_coordinates(patch, [[p - f] for p, f in zip(place, first, strict=True)], mode="mirror")[0]
         return math.sqrt(max(value + SOFT, SOFT) ** 2 - SOFT**2)
 
-    def trace(self, problem: Problem, wing: Wing) -> np.ndarray:
-        """The best path backwards from the goal, points (n, 3) at every second frame, start first."""
-        lo, hi = box(problem)
+    def trace(self, waters: Waters) -> np.ndarray:
+        """The best path from start to goal, points (n, 3), through every second frame."""
         heading = np.linspace(-math.pi, math.pi, 180, endpoint=False)
-        sink = np.linspace(-wing.steepest, wing.steepest, 41)
-        level = np.interp(np.abs(sink), wing.sink, wing.level)[:, None]
-        parts = (level * np.cos(heading), level * np.sin(heading), np.repeat(sink[:, None], heading.size, axis=1))
-        control, path = np.stack(parts, axis=-1).reshape(-1, 3), [np.asarray(problem.goal)]
+        sink = np.linspace(-waters.steepest, waters.steepest, 41)[:, None]
+        level = np.interp(np.abs(sink), waters.sink, waters.level)
+        parts = (level * np.cos(heading), level * np.sin(heading), sink + 0 * heading)
+        control, path, sign = np.stack(parts, axis=-1).reshape(-1, 3), [self.far], 1 if self.backwards else -1
 
-        def inside(at: np.ndarray) -> np.ndarray:
-            return np.clip(at, lo, hi)
-
-        def drift(at: np.ndarray) -> np.ndarray:
-            return control + np.pad(currents(problem, inside(at)), ((0, 0), (0, 1)))
+        def moved(at: np.ndarray, seconds: float) -> np.ndarray:
+            drift = control + np.pad(waters.current(at), ((0, 0), (0, 1)))
+            return np.clip(path[-1] + sign * seconds * drift, waters.lo, waters.hi)
 
         for frame in self.frames[-3::-2]:
-            here = np.repeat(path[-1][None], len(control), axis=0)
-            back = inside(here - 2 * STEP * drift(here - STEP * drift(here)))
-            path.append(back[RegularGridInterpolator(self.axes, frame)(back).argmin()])
-        return np.stack([np.asarray(problem.start), *path[::-1]])
+            points = moved(moved(np.broadcast_to(path[-1], control.shape), STEP), 2 * STEP)
+            path.append(points[RegularGridInterpolator(self.axes, frame)(points).argmin()])
+        return np.stack([*path, self.source][::sign])
 
 
 @njit
-def fly(flow, sinks, levels, heading, sink, duration, x, y, z, t):
-    """Where the controls lead, each held for an equal part of `duration` [s]: RK4, four steps or more each."""
+def fly(flow, sinks, levels, heading, sink, duration, start, t):
+    """Where the controls lead, each held for an equal part of `duration` [s]: points (n, 3) at their ends."""
     steps = max(4, int(duration / heading.size / 2.0))
     dt = duration / heading.size / steps
+    x, y, z = start
+    path = np.empty((heading.size, 3))
     for n in range(heading.size):
-        level = np.interp(abs(sink[n]), sinks, levels)
-        a, b, c = level * math.cos(heading[n]), level * math.sin(heading[n]), sink[n]
+        level, w = np.interp(abs(sink[n]), sinks, levels), sink[n]
         for _ in range(steps):
-            u1, v1 = velocity(flow, x, y, z, t)
-            u2, v2 = velocity(flow, x + dt / 2 * (u1 + a), y + dt / 2 * (v1 + b), z + dt / 2 * c, t)
-            u3, v3 = velocity(flow, x + dt / 2 * (u2 + a), y + dt / 2 * (v2 + b), z + dt / 2 * c, t)
-            u4, v4 = velocity(flow, x + dt * (u3 + a), y + dt * (v3 + b), z + dt * c, t)
-            x += dt * (a + (u1 + 2 * u2 + 2 * u3 + u4) / 6)
-            y += dt * (b + (v1 + 2 * v2 + 2 * v3 + v4) / 6)
-            z += dt * c
-    return x, y, z
+            x, y = rk4_step(flow, x, y, z, t, level * math.cos(heading[n]), level * math.sin(heading[n]), w, dt)
+            z += dt * w
+        path[n] = x, y, z
+    return path
 
 
-def shorten(problem: Problem, wing: Wing, path: np.ndarray, duration: float) -> dict[str, float]:
-    """The quickest path near a first guess: its duration [s], and by how much [m] it misses the goal."""
-    start, goal = np.asarray(problem.start, float), np.asarray(problem.goal, float)
-    parts, unit = np.linspace(0, len(path) - 1, PIECES + 1), duration
+def shorten(waters: Waters, path: np.ndarray, duration: float) -> dict[str, float]:
+    """The quickest path near a first guess: its duration [s], by how much [m] it misses the goal and the box."""
+    start, goal = waters.ends
+    parts = np.linspace(0, len(path) - 1, PIECES + 1)
     knots = np.stack([np.interp(parts, np.arange(len(path)), column) for column in path.T], axis=-1)
     needed = np.diff(knots, axis=0) / (duration / PIECES)
-    water = needed[:, :2] - currents(problem, 0.5 * (knots[1:] + knots[:-1]))
+    water = needed[:, :2] - waters.current(0.5 * (knots[1:] + knots[:-1]))
     heading = np.unwrap(np.arctan2(water[:, 1], water[:, 0]))
-    guess = np.concatenate([heading, np.clip(needed[:, 2], -wing.steepest, wing.steepest), [1.0]])
-    sums = np.tril(np.ones((PIECES, PIECES)))[:-1] / PIECES
-    shifts = 1e-6 * np.eye(guess.size)
+    guess = np.concatenate([heading, np.clip(needed[:, 2], -waters.steepest, waters.steepest), [1.0]])
 
-    def miss(c: np.ndarray) -> np.ndarray:
-        parts = (c[:PIECES], c[PIECES:-1], c[-1] * unit)
-        flow = problem.evaluator.flow
-        return np.array(fly(flow, wing.sink, wing.level, *parts, *start, problem.departure)) - goal
-
-    def slope(c: np.ndarray) -> np.ndarray:
-        return np.stack([(miss(c + one) - miss(c - one)) / 2e-6 for one in shifts], axis=-1) / 100
+    def flown(c: np.ndarray) -> np.ndarray:
+        parts = (c[:PIECES], c[PIECES:-1], c[-1] * duration)
+        return np.asarray(fly(waters.flow, waters.sink, waters.level, *parts, tuple(start), waters.departure))
 
     def room(c: np.ndarray) -> np.ndarray:
-        depth = start[2] + c[-1] * unit * (sums @ c[PIECES:-1])
-        return np.concatenate([problem.hi[2] - depth, depth - problem.lo[2]]) / 100
+        depth = flown(c)[:-1, 2]
+        return np.concatenate([waters.hi[2] - depth, depth - waters.lo[2]])
 
-    def room_slope(c: np.ndarray) -> np.ndarray:
-        by_sink, by_time = c[-1] * unit * sums, unit * (sums @ c[PIECES:-1])
-        rows = np.concatenate([np.zeros((PIECES - 1, PIECES)), by_sink, by_time[:, None]], axis=1)
-        return np.concatenate([-rows, rows]) / 100
-
-    last = np.eye(guess.size)[-1]
     found = minimize(
         lambda c: c[-1],
         guess,
-        jac=lambda c: last,
         method="SLSQP",
-        bounds=[(None, None)] * PIECES + [(-wing.steepest, wing.steepest)] * PIECES + [(0.5, 2.0)],
+        bounds=[(None, None)] * PIECES + [(-waters.steepest, waters.steepest)] * PIECES + [(0.5, 2.0)],
         constraints=[
-            {"type": "eq", "fun": lambda c: miss(c) / 100, "jac": slope},
-            {"type": "ineq", "fun": room, "jac": room_slope},
+            {"type": "eq", "fun": lambda c: (flown(c)[-1] - goal) / 100},
+            {"type": "ineq", "fun": lambda c: room(c) / 100},
         ],
         options={"maxiter": 400, "ftol": 1e-8},
     ).x
+    path = flown(found)
     return {
-        "travel_time_s": round(float(found[-1] * unit), 3),
-        "miss_m": round(float(np.abs(miss(found)).max()), 6),
-        "beyond_depths_m": round(max(0.0, -100 * float(room(found).min())), 6),
+        "travel_time_s": round(float(found[-1] * duration), 3),
+        "miss_m": round(float(np.linalg.norm(path[-1] - goal)), 6),
+        "outside_m": round(float(np.maximum(waters.lo - path, path - waters.hi).max(initial=0.0)), 6),
     }
-
-
-def machine() -> str:
-    """Processor, cores and versions; no names."""
-    names = [line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if line.startswith("model name")]
-    packages = ", ".join(f"{n} {importlib.metadata.version(n)}" for n in ("hj-reachability", "jax", "numpy"))
-    processor = names[0] if names else platform.processor() or platform.machine()
-    return f"{processor}, {os.cpu_count()} cores, Python {platform.python_version()}, {packages}"
-
-
-def _lines(path: str) -> list[str]:
-    return Path(path).read_text().splitlines() if Path(path).is_file() else []
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Every grid, coarse to fine; the check from above; what they say together."""
-    problem = read_scenario(args.scenario, args.set).problem()
-    require(problem.start is not None, "the scenario has no [query]: it names the start and the goal")
-    require(is_steady(problem.evaluator.flow), "the flow changes with time; this script takes steady flows")
-    require(bool(np.isfinite(box(problem)).all()), "the flow has no borders; give `flow.x` and `flow.y`")
-    wing, runs, check = Wing(problem), [], None
-    for text in args.grid or GRIDS:
-        front = Front(problem, wing, tuple(int(n) for n in text.split(",")), args.latest, keep=not runs)
-        totals = {f"{tau:g}": round(tau + at, 2) for tau, at in front.arrivals.items()}
-        runs.append({
-            "grid": list(front.shape),
-            "spacing_m": [round(float(axis[1] - axis[0]), 3) for axis in front.axes],
-            "arrival_s": totals[f"{HEADLINE:g}"],
-            "first_touch_plus_tau_s": totals,
-            "wall_s": round(front.wall, 1),
-        })  # fmt: skip
-        print(f"grid {text}: arrival after {totals[f'{HEADLINE:g}']} s ({front.wall:.0f} s of work)", flush=True)
-        if check is None and math.isfinite(front.arrivals[HEADLINE]):
-            path = front.trace(problem, wing)
-            check = shorten(problem, wing, path, HEADLINE + front.arrivals[HEADLINE])
-            print(f"a path that arrives: {check['travel_time_s']} s", flush=True)
-    result = {
-        "command": " ".join(["python", "benchmarks/level_set.py", *sys.argv[1:]]),
-        "machine": machine(),
-        "symmetric_polar": wing.symmetric,
-        "tau_s": HEADLINE,
-        **conclude(runs),
-        "path_that_arrives": check,
-        "runs": runs,
-    }
-    return result
-
-
-def conclude(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """The arrival time in the limit of fine grids [s], and its error."""
-    at = np.array([one["arrival_s"] for one in runs])
-    spacing = np.array([one["spacing_m"][0] for one in runs])
-    if len(runs) < 2:
-        return {"arrival_s": float(at[-1]), "error_s": None, "bound_s": None}
-    # front methods lie between first and second order
-    limits = [np.polyfit(spacing**order, at, 1)[1] for order in (1, 2)]
-    spread = np.ptp(list(runs[-1]["first_touch_plus_tau_s"].values()))
-    middle = float(np.mean(limits))
-    error = float(max(abs(at[-1] - middle), np.ptp(limits), spread))
+    """Every grid, coarse to fine; the path from above; what they say together."""
+    waters = Waters(read_scenario(args.scenario, args.set).problem())
+    slower = [waters.quickening(end, TAU) for end in waters.ends]
+    backwards = slower[1] < slower[0]
+    shapes = [tuple(int(n) for n in text.split(",")) for text in args.grid or GRIDS]
+    runs: list[dict[str, Any]] = []
+    above: dict[str, float] = {}
+    for shape in shapes:
+        for way in (backwards, not backwards)[: 1 if shape is shapes[-1] else 2]:
+            front = Front(waters, shape, way, args.latest, keep=not runs)
+            runs.append({
+                "grid": list(shape),
+                "spacing_m": [round(float(axis[1] - axis[0]), 3) for axis in front.axes],
+                "from": "goal" if way else "start",
+                "bound_s": {str(tau): round(bound, 2) for tau, bound in front.bound.items()},
+                "touch_plus_tau_s": {str(tau): round(at + tau, 2) for tau, at in front.touch.items()},
+                "wall_s": round(front.wall, 1),
+            })  # fmt: skip
+            print(runs[-1], file=sys.stderr, flush=True)
+            if front.frames and math.isfinite(front.touch[TAU]):
+                above = shorten(waters, front.trace(waters), front.touch[TAU] + TAU)
+                print(f"a path that arrives: {above}", file=sys.stderr, flush=True)
+    packages = ", ".join(f"{n} {importlib.metadata.version(n)}" for n in ("hj-reachability", "jax", "numpy"))
+    processor = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, {packages}"
+    found = {**conclude(runs, above), "path_that_arrives": above, "runs": runs}
     return {
-        "arrival_s": round(middle, 2),
-        "error_s": round(error, 2),
-        "bound_s": round(middle - error, 2),
+        "command": " ".join(["python", "benchmarks/level_set.py", *sys.argv[1:]]),
+        "machine": processor,
+        **found,
+    }
+
+
+def conclude(runs: list[dict[str, Any]], above: dict[str, float]) -> dict[str, Any]:
+    """The finest grid's bound [s], the estimate of its error, and the one less the other."""
+    at = [one["bound_s"][str(TAU)] for one in runs]
+    if len(runs) < 3:
+        return {"finest_s": at[-1], "error_s": None, "bound_s": None}
+    ends = [one["touch_plus_tau_s"][str(TAU)] for one in runs[-3:-1]]
+    differences = {
+        "next_grid": abs(at[-1] - at[-3]),
+        "ends": abs(ends[0] - ends[1]),
+        "tau": float(np.ptp(list(runs[-1]["touch_plus_tau_s"].values()))),
+        "above_the_path": max(0.0, at[-1] - above.get("travel_time_s", math.inf)),
+    }
+    differences = {name: round(value, 2) for name, value in differences.items()}
+    error = max(differences.values())
+    return {
+        "finest_s": at[-1],
+        "differences_s": differences,
+        "error_s": error,
+        "bound_s": round(at[-1] - error, 2),
     }
 
 
@@ -337,15 +339,12 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, help="a JSON file to keep the result in")
     args = parser.parse_args()
     try:
-        result = run(args)
+        text = json.dumps(run(args), indent=1)
     except InputError as error:
         parser.error(str(error))
-    text = json.dumps(result, indent=1)
     if args.output:
-        args.output.parent.mkdir(parents=True, exist_ok=True)
         args.output.write_text(text + "\n")
-    for key in ("arrival_s", "error_s", "bound_s", "machine"):
-        print(f"{key}: {result[key]}")
+    print(text)
 
 
 if __name__ == "__main__":
