@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 ALWAYS = (-math.inf, math.inf)
 BEYOND = 50.0
 """How far [m] a path may pass the depths of the domain: the bound of the speed holds there too."""
+WIDEST = 1e9
+"""Longest side of a box [m]."""
+FASTEST = 100.0
+"""Greatest current [m/s] that is taken for one."""
 MAX_SAMPLES = 100_000_000
 """Largest grid [points] that `sampled` makes: 1.6 GB."""
 
@@ -25,6 +29,8 @@ MAX_SAMPLES = 100_000_000
 def check_range(bounds: Range, where: str) -> None:
     """InputError unless lo < hi."""
     require(bounds[0] < bounds[1], f"`{where}` must rise; got [{bounds[0]:g}, {bounds[1]:g}]")
+    wide = bounds[1] - bounds[0] > WIDEST
+    require(not wide, f"`{where}` must span {WIDEST:g} at most; got [{bounds[0]:g}, {bounds[1]:g}]")
 
 
 def require_positive(value: float, where: str) -> None:
@@ -274,7 +280,7 @@ def sample_flow(
     """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
     require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
     box = [(max(x[0], flow.x_lo), min(x[1], flow.x_hi)), (max(y[0], flow.y_lo), min(y[1], flow.y_hi)), z]
-    points = [(hi - lo) / step + 1 for (lo, hi), step in zip(box, spacing, strict=True)]
+    points = [(float(hi) - float(lo)) / step + 1 for (lo, hi), step in zip(box, spacing, strict=True)]
     require(
         math.prod(points) <= MAX_SAMPLES,
         f"`flow.sampled` = {list(spacing)} makes {math.prod(points):.3g} points, "

@@ -1,6 +1,7 @@
 """The planner: one call for each command."""
 
 from collections.abc import Callable, Sequence
+from os.path import realpath
 from pathlib import Path as File
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ def build(
         require(not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}")
         resolved = scenario
     else:
-        itself = output is not None and File(output).resolve() == File(scenario).resolve()
+        itself = output is not None and realpath(output) == realpath(scenario)
         require(not itself, f"the output {output} is the scenario itself; name another file")
         resolved = read_scenario(scenario, overrides)
     roadmap = build_roadmap(resolved.problem(), threads, progress)

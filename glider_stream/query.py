@@ -22,6 +22,8 @@ from .settings import require
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+LARGEST = 1e12
+"""A number [m, s] in a path file beyond it is no place or time on Earth."""
 
 
 @dataclass(frozen=True)
@@ -110,27 +112,41 @@ class Path:
 def load_path(file: str | File) -> Path:
     """Read a path file (JSON) that `query` wrote; InputError where it is not one."""
     try:
-        table = json.loads(File(file).read_text())
+        table = json.loads(File(file).read_text(encoding="utf-8"))
         legs = tuple(
             Leg(
-                start=np.array(leg["from"], np.float64).reshape(3),
-                end=np.array(leg["to"], np.float64).reshape(3),
-                glide_angle=float(leg["glide_angle_rad"]),
-                heading=float(leg["heading_rad"]),
-                speed=float(leg["speed_mps"]),
-                depart=float(leg["depart_s"]),
-                duration=float(leg["duration_s"]),
-                miss=float(leg["miss_m"]),
-                trajectory=np.array(leg["trajectory"], np.float64).reshape(-1, 4),
+                start=_numbers(leg, "from", (3,)),
+                end=_numbers(leg, "to", (3,)),
+                glide_angle=float(_numbers(leg, "glide_angle_rad", ())),
+                heading=float(_numbers(leg, "heading_rad", ())),
+                speed=float(_numbers(leg, "speed_mps", ())),
+                depart=float(_numbers(leg, "depart_s", ())),
+                duration=float(_numbers(leg, "duration_s", ())),
+                miss=float(_numbers(leg, "miss_m", ())),
+                trajectory=_numbers(leg, "trajectory", (-1, 4)),
             )
             for leg in table["legs"]
         )
-        cost = float(table["cost"]) if table["found"] else math.inf
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        cost = float(_numbers(table, "cost", ())) if table["found"] else math.inf
+        clock = np.concatenate([[0.0], *(leg.trajectory[:, 0] for leg in legs)])
+        require(bool((np.diff(clock) >= 0).all()), "the times of its trajectory do not rise from 0")
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         said = error.strerror if isinstance(error, OSError) else f"{type(error).__name__} at {error}"
+        said = str(error) if isinstance(error, InputError) else said
         raise InputError(f"the path file {file} cannot be read: {said}; write it with `query -o`") from None
     require(bool(legs), f"the path file {file} holds no leg, so there is nothing to draw; query another path")
     return Path(legs[0].start, legs[-1].end, cost, legs)
+
+
+def _numbers(table: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
+    """The finite numbers under a key of a path file; a length of -1 is any above 0."""
+    values = np.array(table[key], np.float64)
+    fits = values.ndim == len(shape) and all(
+        have == n or n < 0 < have for have, n in zip(values.shape, shape, strict=True)
+    )
+    said = f"its `{key}` must be finite numbers of shape {shape}, -1 standing for any length"
+    require(fits and float(np.abs(values).max()) <= LARGEST, said)
+    return values
 
 
 class Planner:

@@ -13,7 +13,7 @@ import numpy as np
 from .domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
 from .errors import InputError
-from .flow import FLOWS, AnalyticFlow, divergence_ratio, is_steady, sample_flow
+from .flow import FASTEST, FLOWS, AnalyticFlow, divergence_ratio, is_steady, sample_flow
 from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Terrain
@@ -75,6 +75,8 @@ class Scenario:
         times = f"the times of the flow, {flow.t_lo:g} to {flow.t_hi:g} s"
         within = flow.t_lo <= self.departure <= flow.t_hi
         require(within, f"`query.departure` = {self.departure:g} s lies outside {times}; choose one of them")
+        fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {flow.max_speed:g}; mend [flow]"
+        require(flow.max_speed <= FASTEST, fast)
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
         words += f", at most {flow.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):

@@ -36,6 +36,12 @@ _DESCRIBED = {
 def check_output(path: str | Path) -> None:
     """InputError unless a file can be made at `path`: before the work, not after it."""
     path = Path(path)
+    try:
+        path.stat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
     require(not path.is_dir(), f"the output {path} is a folder; name a file")
     # a device such as /dev/null would be replaced by a file
     require(path.is_file() or not path.exists(), f"the output {path} is no ordinary file; name another")
@@ -134,13 +140,21 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
         f"the roadmap {path} has format version {version}, this program reads version {VERSION}; "
         + ("update the program" if version > VERSION else "build it again"),
     )
-    require(bool(file.attrs.get("complete", False)), f"the roadmap {path} is incomplete; build it again")
+    complete = file.attrs.get("complete", False)
+    require(
+        isinstance(complete, np.bool_) and bool(complete), f"the roadmap {path} is incomplete; build it again"
+    )
     arrays = {}
     for name, (kind, _, _) in _DESCRIBED.items():
         if name == "nodes/lonlat" and name not in file:
             continue
         require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
-        arrays[name] = np.asarray(file[name][()], dtype=kind)
+        stored = np.asarray(file[name][()])
+        fits = stored.dtype.kind == np.dtype(kind).kind
+        require(fits, f"the roadmap {path} is damaged: {name} is {stored.dtype}, not {kind}; build it again")
+        arrays[name] = stored.astype(kind)
+        finite = bool(np.isfinite(arrays[name]).all())
+        require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
     position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]
     lonlat = arrays.get("nodes/lonlat")
     nodes, edges = len(position), target.size
@@ -156,20 +170,28 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
         and (lonlat is None or lonlat.shape == (nodes, 2))
     )
     require(whole, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
-    sound = bool((arrays["edges/cost"] >= 0).all())
-    require(sound, f"the roadmap {path} is damaged: it holds a cost below 0 or NaN; build it again")
+    for name in ("time", "cost", "speed", "miss"):
+        sound = bool((arrays[f"edges/{name}"] >= 0).all())
+        require(sound, f"the roadmap {path} is damaged: it holds a {name} below 0; build it again")
+    step = np.diff(target.astype(np.int64))
+    step[indptr[1:-1][(indptr[1:-1] > 0) & (indptr[1:-1] < edges)] - 1] = 1  # from one row to the next
+    require(bool((step > 0).all()), f"the roadmap {path} is damaged: its targets do not rise; build it again")
     pairs = file["pairs"].attrs
+    counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
+    wall = float(pairs["wall_s"])
+    counted = min(counts.values()) >= 0 and 0 <= wall < np.inf
+    require(counted, f"the roadmap {path} is damaged: a count or its wall time makes no sense; build it again")
     return Roadmap(
         position=position,
         indptr=indptr,
         target=target,
         **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
-        counts={status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status},
+        counts=counts,
         provenance=Provenance(
             seed=int(file.attrs["seed"]),
             **{f.name: str(file.attrs[f.name]) for f in fields(Provenance) if f.name != "seed"},
         ),
-        wall_s=float(pairs["wall_s"]),
+        wall_s=wall,
         threads=int(pairs["threads"]),
         lonlat=lonlat,
     )

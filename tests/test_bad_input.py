@@ -1,5 +1,6 @@
 """Unusable input: exit code 2, one sentence that names what was given and what to do, no file touched."""
 
+import math
 import os
 import subprocess
 from pathlib import Path
@@ -116,6 +117,8 @@ SCENARIOS = {
         "x = [-inf, 200.0]",
         "`domain.x` must be a finite number; got -inf",
     ),
+    "a current beyond all": ("speed = 0.4", "speed = 1e300", "100 m/s at most", "mend [flow]"),
+    "a domain beyond all": ("x = [-200.0, 200.0]", "x = [-1e308, 1e308]", "`domain.x` must span 1e+09 at most"),
     "NaN in a vortex": ("x = 20.0", "x = nan", "vortex.x` must be a finite number; got nan"),
     "NaN in the start": ("[-190.0, 190.0, 0.0]", "[nan, 190.0, 0.0]", "`query.start` must be", "got nan"),
     "a number too large for a float": (
@@ -298,11 +301,22 @@ def test_commands(capsys, place, case):
     refused(capsys, place, arguments, *names)
 
 
+PATH = (
+    '{"found": true, "cost": 1, "legs": [{"from": [0, 0, 0], "to": [0, 0, -1], "glide_angle_rad": -0.5, '
+    '"heading_rad": 0, "speed_mps": 1, "depart_s": 0, "duration_s": %s, "miss_m": 0, "trajectory": %s}]}'
+)
 PATHS = {
     "no JSON": "no JSON",
     "a list": "[]",
     "no legs": '{"found": false, "travel_time_s": null, "cost": null, "legs": []}',
     "legs of text": '{"found": true, "cost": 1, "legs": ["leg"]}',
+    "brackets without end": "[" * 100_000,
+    "NaN on the way": PATH % ("NaN", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
+    "infinity on the way": PATH % ("1", "[[0, 0, 0, 0], [1, 0, Infinity, -1]]"),
+    "a number beyond all": PATH % ("1" + "0" * 400, "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
+    "no way at all": PATH % ("1", "[]"),
+    "rows of three": PATH % ("1", "[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]"),
+    "back in time": PATH % ("1", "[[5, 0, 0, 0], [1, 0, 0, -1]]"),
     "a leg from nowhere": '{"found": true, "cost": 1, "legs": [{"from": [1, 2], "to": [1, 2, 3]}]}',
 }
 
@@ -342,6 +356,13 @@ def test_a_folder_that_may_not_be_written(capsys, place, monkeypatch):
     monkeypatch.setattr("tempfile.TemporaryFile", deny)
     for arguments in (BUILD, QUERY):
         refused(capsys, place, arguments, arguments[-1], "Permission denied", "name another")
+
+
+def test_links_that_lead_nowhere(capsys, place):
+    (place / "loop").symlink_to("loop")
+    refused(capsys, place, ("build", "loop", "-o", "out.h5"), "loop", "seed-box")
+    refused(capsys, place, ("build", "small.toml", "-o", "loop"), "loop cannot be written", "name another")
+    assert (place / "loop").is_symlink()
 
 
 def test_a_full_disk(capsys, place, monkeypatch):
@@ -436,6 +457,13 @@ ROADMAPS = {
         "do not fit each other",
         "build it again",
     ),
+    "NaN for a time": (other_data("edges/time", lambda data: data * math.nan), "edges/time holds NaN"),
+    "NaN for a heading": (other_data("edges/heading", lambda data: data * math.nan), "edges/heading holds NaN"),
+    "a node nowhere": (other_data("nodes/position", lambda data: data * math.nan), "nodes/position holds NaN"),
+    "a speed below 0": (other_data("edges/speed", lambda data: -data), "a speed below 0"),
+    "targets twice": (other_data("edges/target", lambda data: data * 0), "targets do not rise"),
+    "rows in floats": (other_data("edges/indptr", lambda data: data.astype(float)), "edges/indptr is float64"),
+    "complete in words": (change("complete", "yes"), "incomplete; build it again"),
     "edges to nowhere": (
         other_data("edges/target", lambda data: data + 1000),
         "do not fit",
