@@ -12,7 +12,8 @@ from typing import Any
 
 _HOMES = {
     "errors": ("InputError",),
-    "query": ("Path", "Planner"),
+    "path": ("Path",),
+    "query": ("Planner",),
     "roadmap": ("Roadmap", "build_roadmap"),
     "scenario": ("Scenario", "read_scenario", "shipped_scenarios"),
     "store": ("read_roadmap", "write_roadmap"),

@@ -1,6 +1,7 @@
 """The command line. Each command's body is one library call; nothing heavy is loaded before it is needed."""
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -90,7 +91,7 @@ def info(roadmap: Path, as_json: bool) -> None:
 @ROADMAP
 @click.argument("path", required=False, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF.")
-@click.option("--depth", "depths", multiple=True, type=float, help="A depth [m] to draw the current at.")
+@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
 def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...]) -> None:
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
     from . import planner
@@ -111,9 +112,9 @@ def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ..
 @JSON
 def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> None:
     """Say what the current files CURRENTS hold, and what the planner takes for what."""
-    from .describe import describe
+    from . import planner
 
-    description = describe(currents, [(*place, None)[:4] for place in at])
+    description = planner.describe(currents, [(*place, None)[:4] for place in at])
     if as_json:
         _write_json(description.as_dict())
     else:
@@ -123,6 +124,7 @@ def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> 
 def main() -> None:
     """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
     try:
+        _check_environment()
         cli(prog_name="glider-stream", standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
@@ -131,12 +133,22 @@ def main() -> None:
         place = context.command_path if context else "glider-stream"
         _refuse(f"{error.format_message().rstrip('.')}; see `{place} --help`")
     except OSError as error:
-        _refuse(f"{error.filename or 'a file'}: {error.strerror or error}")
+        # what is written to files names them; only standard output has no name
+        place = error.filename or "standard output"
+        _refuse(f"{place} cannot be used: {(error.strerror or str(error)).lower()}; name another")
     except MemoryError as error:
         _refuse(f"there is not enough memory ({error}); make the problem smaller")
     except (click.Abort, KeyboardInterrupt):
         click.echo("glider-stream: stopped", err=True)
         sys.exit(130)
+
+
+def _check_environment() -> None:
+    """Numba answers a bad number of threads with a traceback, as soon as it is imported."""
+    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
+    fits = threads.isdecimal() and int(threads) > 0
+    if not fits:
+        raise InputError(f"the environment's NUMBA_NUM_THREADS must be a whole number above 0; got {threads!r}")
 
 
 def _refuse(sentence: str) -> None:

@@ -21,11 +21,11 @@ NEARLY_FREE = 0.35
 
 @dataclass(frozen=True)
 class Level:
-    """One depth [m]: greatest and rms speed [m/s], and divergence over vorticity."""
+    """One depth [m]: greatest and rms speed [m/s], None where it is dry; divergence over vorticity."""
 
     depth: float
-    max_speed: float
-    rms_speed: float
+    max_speed: float | None
+    rms_speed: float | None
     divergence_ratio: float | None
 
 
@@ -108,8 +108,10 @@ class Description:
         levels = "not said" if file.surface else f"{file.depth[0]:.4g} to {file.depth[-1]:.6g} m, {nz} levels"
         lines.append(f"  depths      {levels}")
         for level in self.levels:
-            speeds = f"at most {level.max_speed:.2f} m/s, rms {level.rms_speed:.2f} m/s"
-            lines.append(f"  at {level.depth:<9.4g}{speeds}{_ratio(level.divergence_ratio)}")
+            speeds = "no water"
+            if level.max_speed is not None:
+                speeds = f"at most {level.max_speed:.2f} m/s, rms {level.rms_speed:.2f} m/s"
+            lines.append(f"  at {f'{level.depth:.4g} m':<9}{speeds}{_ratio(level.divergence_ratio)}")
         lines.append(f"  divergence  {self._meaning()}")
         lines.append(f"  frame       {self._frame()}")
         lines += [f"  note        {note}" for note in file.notes]
@@ -152,8 +154,10 @@ def _finite(value: float) -> float | None:
 def _level(file: OceanFile, k: int) -> Level:
     squared = file.u[:, k].astype(np.float64) ** 2 + file.v[:, k].astype(np.float64) ** 2
     squared = squared[np.isfinite(squared)]
-    most, mean = (float(squared.max()), float(squared.mean())) if squared.size else (0.0, 0.0)
-    return Level(float(file.depth[k]), most**0.5, mean**0.5, _finite(divergence_ratio(file, k)))
+    depth, ratio = float(file.depth[k]), _finite(divergence_ratio(file, k))
+    if not squared.size:
+        return Level(depth, None, None, ratio)
+    return Level(depth, float(squared.max()) ** 0.5, float(squared.mean()) ** 0.5, ratio)
 
 
 def describe(

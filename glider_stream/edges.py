@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bins import node_bins
-from .flow import is_steady
+from .flow import LONGEST, WIDEST, is_steady
 from .kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
@@ -95,7 +95,11 @@ class IntegrationSettings:
     def __post_init__(self) -> None:
         require(self.dt > 0, f"`integration.dt` must be above 0 s; got {self.dt:g}")
         require(self.steps >= 1, f"`integration.steps` must be at least 1; got {self.steps}")
+        horizon, most = self.dt * self.steps, f"{LONGEST:g} s, 30 years"
+        require(horizon <= LONGEST, f"`integration.dt` times `steps` must be at most {most}; got {horizon:g} s")
         require(self.tolerance > 0, f"`integration.tolerance` must be above 0 m; got {self.tolerance:g}")
+        fits = self.tolerance <= WIDEST
+        require(fits, f"`integration.tolerance` must be {WIDEST:g} m at most; got {self.tolerance:g}")
 
     def kernel(self) -> motion.Integration:
         """As the kernels read it."""

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path as File
 
-from .query import Path
+from .path import Path
 from .settings import require
 from .store import check_output, replacing
 

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 ALWAYS = (-math.inf, math.inf)
 BEYOND = 50.0
 """How far [m] a path may pass the depths of the domain: the bound of the speed holds there too."""
+LONGEST = 1e9
+"""The longest time [s] that a scenario may speak of: beyond, clocks lose their microseconds."""
 WIDEST = 1e9
 """Longest side of a box [m]."""
 FASTEST = 100.0
@@ -312,6 +314,15 @@ def sample_flow(
         if math.isfinite(flow.length_scale)
         else steps[0],
     )
+
+
+def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, z: Range) -> float:
+    """The most [m/s] that a flow read on a grid is off, at 4096 points of a box [m]."""
+    lo, hi = np.array([x, y, z]).T
+    px, py, pz = (lo + np.random.default_rng(0).random((4096, 3)) * (hi - lo)).T.copy()
+    now = np.zeros(px.size)
+    off = kernel.velocities(flow, px, py, pz, now) - kernel.velocities(sampled, px, py, pz, now)
+    return float(np.hypot(off[:, 0], off[:, 1]).max())
 
 
 def flow_sha256(flow: kernel.Flow) -> str:

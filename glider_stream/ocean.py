@@ -5,7 +5,7 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -116,7 +116,9 @@ class OceanFlow:
     `clearance` [m] is kept above the seabed; `names` where the file does not speak for itself.
     """
 
-    file: tuple[str, ...]
+    file: tuple[str, ...] = field(
+        metadata={"missing": "the file of currents, or a list of them, such as --set flow.file=currents.nc"}
+    )
     clearance: float = 0.0
     epoch: str | None = None
     names: Names | None = None
@@ -165,7 +167,7 @@ def read_currents(
     needs; more than `limit` [bytes] is refused.
     """
     paths = [Path(files)] if isinstance(files, (str, Path)) else [Path(path) for path in files]
-    require(len(paths) > 0, "`file` must name at least one current file; got none")
+    require(len(paths) > 0, "`flow.file` must name at least one current file; got none")
     said = names if isinstance(names, Names) else from_table(Names, names or {}, "names")
     domain = None if lon is None or lat is None else (lon, lat, depth or (0.0, 0.0))
     parts: list[_Part] = []

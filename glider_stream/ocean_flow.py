@@ -307,18 +307,17 @@ def _assemble(
 def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice, Array | None]:
     """Which times a plan that starts at the epoch can read, and when they are [s]."""
     if isinstance(epoch, str):
-        epoch = parse_time(epoch, "`epoch`")
+        epoch = parse_time(epoch, "`flow.epoch`")
     if file.times is None or file.steady:
         return slice(0, 1), None
     require(
         epoch is not None,
-        f"`epoch` is missing: {file.name} changes with time, {file.time_range}; say when t = 0 is",
+        f"`flow.epoch` is missing: {file.name} changes with time, {file.time_range}; say when t = 0 is",
     )
     assert epoch is not None
-    require(
-        bool(file.times[0] <= epoch <= file.times[-1]),
-        f"`epoch` = {epoch.astype('datetime64[s]')}Z lies outside the times of {file.name}, {file.time_range}",
-    )
+    when = f"`flow.epoch` = {epoch.astype('datetime64[s]')}Z"
+    within = bool(file.times[0] <= epoch <= file.times[-1])
+    require(within, f"{when} lies outside the times of {file.name}, {file.time_range}")
     seconds = (file.times - epoch) / np.timedelta64(1, "s")
     first = min(int(np.searchsorted(seconds, 0, side="right")) - 1, seconds.size - 2)
     return slice(first, seconds.size), seconds[first:]
@@ -386,7 +385,7 @@ def ocean_flow(
     above the bottom: the lower face of the deepest wet cell of the nearest column. Above the top level, and
     at all depths where the file names none, the current is held.
     """
-    require(clearance >= 0, f"`clearance` must be at least 0 m; got {clearance:g}")
+    require(clearance >= 0, f"`flow.clearance` must be at least 0 m; got {clearance:g}")
     require(0 <= depth[0] <= depth[1], f"the domain's depth must rise from 0 or below; got {list(depth)}")
     flow, seabed = _build(file, frame, lon, lat, depth, epoch, clearance)
     error = frame.scale_error(lon, lat)

@@ -5,9 +5,12 @@ from os.path import realpath
 from pathlib import Path as File
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .domain import Point
 from .export import check_export, export_path
-from .query import Path, Planner, load_path
+from .path import Path, load_path
+from .query import Planner, check_unchanged
 from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .settings import require
@@ -15,6 +18,9 @@ from .store import check_output, read_roadmap, write_roadmap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from .describe import Description, Place
+    from .ocean import Names
 
 
 def build(
@@ -74,20 +80,29 @@ def plot(
     output: str | File | None = None,
     depths: Sequence[float] | None = None,
 ) -> "Figure":
-    """Draw a path over its roadmap and the current, or the roadmap where there is none."""
+    """Draw a path over its roadmap and the current at some `depths` [m], or the roadmap where there is none.
+
+    A path file or object; up to four depths for a path, one for a roadmap. Written where `output` says.
+    """
     from .plot import check_figure, plot_roadmap, plot_route, save_figure
 
     if output is not None:
         check_figure(output)
     road = info(roadmap)
+    title = "" if isinstance(roadmap, Roadmap) else File(roadmap).stem
+    route = path if path is None or isinstance(path, Path) else load_path(path)
     scenario = scenario_from_text(road.provenance.scenario)
     problem = scenario.problem()
+    check_unchanged(road, problem)
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
-    if path is None:
-        figure = plot_roadmap(flow, terrain, problem, road)
+    if route is None:
+        require(depths is None or len(depths) == 1, f"a roadmap is drawn at one depth; got {depths}")
+        figure = plot_roadmap(flow, terrain, problem, road, None if depths is None else depths[0], title)
     else:
-        route = path if isinstance(path, Path) else load_path(path)
-        figure = plot_route(flow, terrain, problem, road.position, route, depths)
+        stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
+        here = bool(problem.evaluator.allowed(stops, problem.departure).all())
+        require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
+        figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
     if output is not None:
         save_figure(figure, output)
     return figure
@@ -119,3 +134,16 @@ def plot_steering(
     if output is not None:
         save_figure(figure, output)
     return figure
+
+
+def describe(
+    currents: str | File | Sequence[str | File], at: Sequence["Place"] = (), names: "Names | None" = None
+) -> "Description":
+    """What current files hold, and what the planner takes for what; the current at places `at`.
+
+    A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None where there is but one.
+    `names` says what the files do not. InputError where they cannot be used.
+    """
+    from .describe import describe
+
+    return describe(currents, at, names)

@@ -51,14 +51,17 @@ class Problem:
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""
-        shown = [*point]
+        shown, deepest = [*point], f"domain, which ends at z = {self.lo[2]:g} m"
         if self.to_lonlat is not None and np.isfinite(point).all():
-            shown = [*self.to_lonlat(point[None])[0], -point[2]]
+            shown = [*self.to_lonlat(point[None])[0], 0.0 - point[2]]
+            deepest = f"domain, which ends at a depth of {-self.lo[2]:g} m"
         said = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
         require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
         require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
+        require(bool(point[2] >= self.lo[2]), f"`{name}` = {said} lies below the {deepest}; move it up")
         inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
-        require(inside, f"`{name}` = {said} lies outside the flow or on land; move it into open water")
+        where = "outside the flow, on land or too near the seabed"
+        require(inside, f"`{name}` = {said} lies {where}; move it into open water")
 
     def legs(self, position: Array) -> Legs:
         """How legs among these nodes (n, 3) [m] are found."""
@@ -77,7 +80,7 @@ class Progress:
 
     def __str__(self) -> str:
         rate = self.done / max(self.seconds, 1e-9)
-        left = (self.total - self.done) / rate if self.done else math.inf
+        left = (self.total - self.done) / rate if self.done else 0.0 if self.total == 0 else math.inf
         share = self.connected / max(self.done, 1)
         so_far = f"{self.done:,} of {self.total:,} pairs, {rate:,.0f} pairs/s"
         return f"{so_far}, {share:.1%} connected, {left:,.0f} s left"
@@ -167,14 +170,13 @@ def node_positions(problem: Problem) -> Array:
     sampled = problem.sampler.nodes(
         problem.lo, problem.hi, lambda points: problem.evaluator.allowed(points, problem.departure)
     )
+    require(len(sampled) > 0, "the scenario has no node in open water; move the domain or sample more")
     named = []
     for name, point in (("query.start", problem.start), ("query.goal", problem.goal)):
         if point is not None:
             problem.check_point(point, name)
             named.append(point)
-    position = np.vstack([sampled, *named])
-    require(len(position) > 0, "the scenario has no node in open water; move the domain or sample more")
-    return position
+    return np.vstack([sampled, *named])
 
 
 def warm_up(problem: Problem) -> None:

@@ -6,7 +6,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from .settings import require
 
@@ -85,6 +84,8 @@ class SobolSampler(RandomSampler):
 
     def draw(self, count: int) -> Array:
         """As RandomSampler says."""
+        from scipy.stats import qmc  # half of a query's start-up, and few scenarios draw from it
+
         powers = (count - 1).bit_length()
         return np.asarray(qmc.Sobol(3, rng=np.random.default_rng(self.seed)).random_base2(powers)[:count])
 
@@ -95,6 +96,8 @@ class HaltonSampler(RandomSampler):
 
     def draw(self, count: int) -> Array:
         """As RandomSampler says."""
+        from scipy.stats import qmc
+
         return np.asarray(qmc.Halton(3, rng=np.random.default_rng(self.seed)).random(count))
 
 

@@ -4,6 +4,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from datetime import date
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 from .domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
 from .errors import InputError
-from .flow import FASTEST, FLOWS, AnalyticFlow, divergence_ratio, is_steady, sample_flow
+from .flow import FASTEST, FLOWS, LONGEST, AnalyticFlow, divergence_ratio, is_steady, sample_flow, sampling_error
 from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Terrain
@@ -49,6 +50,10 @@ class QueryPoints:
     start: Point
     goal: Point
     departure: float = 0.0
+
+    def __post_init__(self) -> None:
+        fits = abs(self.departure) <= LONGEST
+        require(fits, f"`query.departure` must be within {LONGEST:g} s of 0; got {self.departure:g}")
 
 
 @dataclass(frozen=True)
@@ -116,9 +121,13 @@ class Scenario:
             # no path between two nodes strays further from the box than half of what a leg can cover
             stray = (glide + flow.max_speed * horizon) / 2
             x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
-            flow = sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
-        kind = next(name for name, one in FLOWS.items() if one is type(self.flow))
-        words = kind if self.flow.sampled is None else f"{kind}, sampled every {list(self.flow.sampled)} m"
+            exact, flow = flow, sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
+        words = next(name for name, one in FLOWS.items() if one is type(self.flow))
+        if self.flow.sampled is not None:
+            box = ((max(lo[0], flow.x_lo), min(hi[0], flow.x_hi)), (max(lo[1], flow.y_lo), min(hi[1], flow.y_hi)))
+            off = sampling_error(exact, flow, *box, (lo[2], hi[2]))
+            spacing = ", ".join(f"{step:g}" for step in self.flow.sampled)
+            words += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
         return flow, OpenWater(-np.inf), words
 
 
@@ -168,7 +177,7 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         require(isinstance(block, Mapping), f"`{name}` must be a section, [{name}]; got {block!r}")
     for name in SECTIONS:
         require(name in table or name == "query", f"the section [{name}] is missing; add it")
-    table = {**table, "flow": _located(table["flow"], folder)}
+    table = {**table, "flow": _located(_dated(table["flow"]), folder)}
     blocks: dict[str, Any] = {
         name: from_kinds(kinds, table[name], name, selector) for name, (selector, kinds) in KINDS.items()
     }
@@ -184,6 +193,11 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         query=from_table(QueryPoints, table["query"], "query") if "query" in table else None,
         text=to_toml(table),
     )
+
+
+def _dated(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A section with TOML's bare dates as texts: `epoch = 2024-11-20T12:00:00` says what its text would."""
+    return {key: value.isoformat() if isinstance(value, date) else value for key, value in table.items()}
 
 
 def _located(flow: Mapping[str, Any], folder: Path) -> dict[str, Any]:

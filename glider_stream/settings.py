@@ -37,12 +37,14 @@ def _described(kind: Any) -> str:
 def _fits(value: Any, kind: Any, where: str) -> Any:
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
-        for part in inner:
-            if part is not type(None):
-                try:
-                    return _fits(value, part, where)
-                except InputError:
-                    continue
+        parts = [part for part in inner if part is not type(None)]
+        if len(parts) == 1:
+            return _fits(value, parts[0], where)
+        for part in parts:
+            try:
+                return _fits(value, part, where)
+            except InputError:
+                continue
     elif origin is typing.Literal:
         if value in inner and not isinstance(value, bool):
             return value

@@ -54,10 +54,13 @@ def check_output(path: str | Path) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`, moved into its place when the block ends well, else removed."""
+    """A temporary name beside `path`, moved into its place when the block ends well, else removed.
+
+    What the block cannot write, as where the disk is full, is an InputError that names `path`.
+    """
     check_output(path)
-    path = path.resolve()  # a link stays one
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
+    target = path.resolve()  # a link stays one
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -66,7 +69,11 @@ def replacing(path: Path) -> Iterator[Path]:
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, path)
+        os.replace(temporary, target)
+    except OSError as error:
+        reason = (error.strerror or "it cannot be written").lower()
+        room = "make room on its disk, or name another output"
+        raise InputError(f"the output {path} cannot be written whole: {reason}; {room}") from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -78,13 +85,8 @@ def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
         _write(file, roadmap)
         file.flush()
         image = file.id.get_file_image()
-    try:
-        with replacing(Path(path)) as temporary:
-            temporary.write_bytes(image)
-    except OSError as error:
-        reason = (error.strerror or "it cannot be written").lower()
-        room = "make room on its disk, or name another output"
-        raise InputError(f"the roadmap {path} cannot be written whole: {reason}; {room}") from None
+    with replacing(Path(path)) as temporary:
+        temporary.write_bytes(image)
 
 
 def _write(file: h5py.File, roadmap: Roadmap) -> None:

@@ -117,6 +117,9 @@ SCENARIOS = {
         "x = [-inf, 200.0]",
         "`domain.x` must be a finite number; got -inf",
     ),
+    "a horizon beyond all": ("dt = 5.0", "dt = 1e8", "`steps` must be at most 1e+09 s", "got 1.25e+10"),
+    "a tolerance beyond all": ("tolerance = 8.0", "tolerance = 1e300", "1e+09 m at most; got 1e+300"),
+    "a departure beyond all": ("[query]", "[query]\ndeparture = -1e300", "within 1e+09 s of 0; got -1e+300"),
     "a current beyond all": ("speed = 0.4", "speed = 1e300", "100 m/s at most", "mend [flow]"),
     "a domain beyond all": ("x = [-200.0, 200.0]", "x = [-1e308, 1e308]", "`domain.x` must span 1e+09 at most"),
     "NaN in a vortex": ("x = 20.0", "x = nan", "vortex.x` must be a finite number; got nan"),
@@ -269,6 +272,15 @@ COMMANDS = {
     ),
     "a goal above the surface": ((*QUERY, "--goal", "0,0,20"), "`goal` = [0, 0, 20] lies above the surface"),
     "a start outside the flow": ((*QUERY, "--start", "1e4,0,0"), "`start` = [10000, 0, 0]", "move it"),
+    "a goal below the domain": ((*QUERY, "--goal", "0,0,-151"), "below the domain", "z = -150 m", "move it up"),
+    "a map in the air": (("plot", "road.h5", "-o", "figure.png", "--depth", "-1"), "0 m to 150 m", "got -1"),
+    "a map below all": (("plot", "road.h5", "-o", "figure.png", "--depth", "1e9"), "0 m to 150 m", "got 1e+09"),
+    "a map at no depth": (("plot", "road.h5", "-o", "figure.png", "--depth", "nan"), "0 m to 150 m", "got nan"),
+    "two maps of a roadmap": (
+        ("plot", "road.h5", "-o", "figure.png", "--depth", "0", "--depth", "9"),
+        "drawn at one depth; got (0.0, 9.0)",
+    ),
+    "a figure in no folder": (("plot", "road.h5", "-o", "none/figure.png"), "none does not exist; make it"),
     "unknown ending": (
         ("query", "road.h5", "-o", "path.xyz"),
         "path.xyz must end in one of: .json",
@@ -317,6 +329,10 @@ PATHS = {
     "no way at all": PATH % ("1", "[]"),
     "rows of three": PATH % ("1", "[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]"),
     "back in time": PATH % ("1", "[[5, 0, 0, 0], [1, 0, 0, -1]]"),
+    "no time at all": PATH % ("0", "[[0, 0, 0, 0], [0, 0, 0, -1]]"),
+    "another water": PATH.replace("[0, 0, -1]", "[0, 9999, -1]") % ("1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
+    "legs that were not found": PATH.replace("true", "false") % ("1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
+    "a time below 0": PATH % ("-1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a leg from nowhere": '{"found": true, "cost": 1, "legs": [{"from": [1, 2], "to": [1, 2, 3]}]}',
 }
 
@@ -324,7 +340,9 @@ PATHS = {
 @pytest.mark.parametrize("case", PATHS)
 def test_path_files(capsys, place, case):
     (place / "bad.json").write_text(PATHS[case])
-    refused(capsys, place, ("plot", "road.h5", "bad.json", "-o", "figure.png"), "bad.json", "query")
+    what = "leaves the roadmap's water" if case == "another water" else "bad.json"
+    cure = "found in" if case == "another water" else "`query -o`"
+    refused(capsys, place, ("plot", "road.h5", "bad.json", "-o", "figure.png"), what, cure)
 
 
 def test_a_text_for_currents_in_a_scenario(capsys, place):
@@ -373,9 +391,7 @@ def test_a_full_disk(capsys, place, monkeypatch):
     before = everything(place)
     code, out, err = command(capsys, *BUILD)
     assert (code, out) == (2, "")
-    assert (
-        "the roadmap out.h5 cannot be written whole: no space left on device; make room" in err.splitlines()[-1]
-    )
+    assert "the output out.h5 cannot be written whole: no space left on device; make room" in err.splitlines()[-1]
     assert everything(place) == before
 
 
@@ -530,6 +546,34 @@ def test_in_a_process_of_its_own(place, arguments, names):
     ended = subprocess.run([executable(), *arguments], capture_output=True, text=True, check=False)
     assert_refused((ended.returncode, ended.stdout, ended.stderr), *names)
     assert everything(place) == before
+
+
+@pytest.mark.parametrize("threads", ["0", "-2", "two", ""])
+def test_an_environment_that_numba_cannot_use(place, threads):
+    said = run_with({"NUMBA_NUM_THREADS": threads}, "info", "road.h5")
+    assert_refused(said, f"NUMBA_NUM_THREADS must be a whole number above 0; got {threads!r}")
+
+
+def test_standard_output_that_takes_nothing(place):
+    with open("/dev/full", "w") as full:
+        code, _, err = run_with({}, "info", "road.h5", stdout=full)
+    assert_refused((code, "", err), "standard output cannot be used: no space left on device")
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert run_with({}, "info", "road.h5", stdout=writer) == (1, None, "")  # click's own answer, a quiet one
+    os.close(writer)
+
+
+def run_with(environment, *arguments, stdout=subprocess.PIPE):
+    process = subprocess.run(
+        [executable(), *arguments],
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        env=os.environ | environment,
+        text=True,
+        check=False,
+    )
+    return process.returncode, process.stdout, process.stderr
 
 
 def test_there_are_enough_cases():

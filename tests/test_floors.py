@@ -18,7 +18,7 @@ FLOORS = {
     " errors settings threads",
     4: "bins glider flow domain frame ocean ocean_flow terrain",
     5: "sampling neighbours edges legs",
-    6: "roadmap",
+    6: "roadmap path",
     7: "store query",
     8: "export plot progress describe verify jobs",
     9: "scenario planner cli",

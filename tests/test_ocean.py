@@ -501,8 +501,8 @@ def test_the_planner_and_the_sample_read_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("domain", "epoch", "words"),
     [
-        (DOMAIN, None, "`epoch` is missing.* 2023-02-27T00:00:00Z to 2023-02-28T00:00:00Z"),
-        (DOMAIN, "2023-03-01", "`epoch` = 2023-03-01T00:00:00Z lies outside .* 2023-02-27"),
+        (DOMAIN, None, "`flow.epoch` is missing.* 2023-02-27T00:00:00Z to 2023-02-28T00:00:00Z"),
+        (DOMAIN, "2023-03-01", "`flow.epoch` = 2023-03-01T00:00:00Z lies outside .* 2023-02-27"),
         (DOMAIN, "soon", "'soon'"),
         (((19.0, 21.0), *DOMAIN[1:]), str(START), "longitude 19 to 21 lies partly outside .* 20 to 21.6"),
         (

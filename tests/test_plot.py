@@ -15,7 +15,7 @@ from glider_stream import plot
 from glider_stream.errors import InputError
 from glider_stream.kernels.flow import OceanGrid, Vortices, velocity
 from glider_stream.kernels.terrain import OpenWater, Seabed, allowed
-from glider_stream.query import Leg, Path
+from glider_stream.path import Leg, Path
 from glider_stream.roadmap import node_positions
 from glider_stream.scenario import scenario_from_table
 
@@ -52,7 +52,8 @@ def box_scene():
     side = (np.arange(16) + 0.5) / 16 * 900 - 450
     mesh = np.meshgrid(side, side, [0.0, -100.0, -200.0, -300.0], indexing="ij")
     position = np.column_stack([m.ravel() for m in mesh])
-    problem = SimpleNamespace(lo=np.array([-450.0, -450, -300]), hi=np.array([450.0, 450, 0]), departure=0.0)
+    lo, hi = np.array([-450.0, -450, -300]), np.array([450.0, 450, 0])
+    problem = SimpleNamespace(lo=lo, hi=hi, departure=0.0, to_lonlat=None)
     depths = [0, 200, 100, 300, 0, 100, 300, 200, 300, 0]
     path = zigzag((-450, 450), (450, -450), depths, 1500.0, 60.0)
     return SimpleNamespace(
@@ -79,7 +80,8 @@ def ocean_scene():
     terrain = Seabed(bottom, 20.0, index_map, per, per, lo, lo)
     position = np.random.default_rng(1).uniform([lo, lo, -500], [hi, hi, 0], (1500, 3))
     position = position[plot.sample_water(terrain, *position.T)]
-    problem = SimpleNamespace(lo=np.array([lo, lo, -500]), hi=np.array([hi, hi, 0]), departure=21600.0)
+    box = {"lo": np.array([lo, lo, -500]), "hi": np.array([hi, hi, 0])}
+    problem = SimpleNamespace(**box, departure=21600.0, to_lonlat=lambda at: at[:, :2] / 1e5 + [-18.5, 38.0])
     depths = [0, 480, 20, 500, 0, 450, 150, 500, 0]
     path = zigzag((-25e3, -20e3), (22e3, 25e3), depths, 72000.0, 2500.0)
     return SimpleNamespace(flow=flow, terrain=terrain, problem=problem, position=position, path=path)
@@ -115,7 +117,7 @@ def draw(name):
     scene = ocean_scene() if "ocean" in name else box_scene()
     if "roadmap" in name:
         road = roadmap_of(scene, 12e3 if "ocean" in name else 250.0)
-        return plot.plot_roadmap(scene.flow, scene.terrain, scene.problem, road, "A roadmap")
+        return plot.plot_roadmap(scene.flow, scene.terrain, scene.problem, road, title="A roadmap")
     if "many" in name:
         depths = [0, *np.tile([300, 50], 60), 0]
         scene.path = zigzag((-450, 450), (450, -450), depths, 5 * 86400.0, 5.0, rows=9)
@@ -196,7 +198,12 @@ def test_panels_and_their_units_fit_the_scale(figures):
     assert current == ["(b) Current at 0 m", *(f"Current at {depth} m" for depth in (100, 200, 300))]
     assert "(b) Current at 0 m, t = 6 h" in titles(ocean)
     labels = [text for text, _ in written(ocean)]
-    assert {"East (km)", "North (km)", "Depth (m)", "Time since departure (h)"} <= set(labels)
+    assert {
+        "East of 18.5000° W (km)",
+        "North of 38.0000° N (km)",
+        "Depth (m)",
+        "Time since departure (h)",
+    } <= set(labels)
     assert "Time since departure (min)" in [text for text, _ in written(box)]
     assert box._suptitle.get_text() == "A route: 9 legs, 25 min"
     for letter in "abcd":
@@ -289,9 +296,9 @@ def test_a_failed_save_leaves_the_old_file(tmp_path):
 
     def savefig(path, **options):
         path.write_text("half")
-        raise OSError("disk full")
+        raise OSError(28, "No space left on device")
 
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InputError, match=r"route\.png cannot be written whole: no space left on device"):
         plot.save_figure(SimpleNamespace(savefig=savefig), old)
     with pytest.raises(InputError, match="got 0"):
         plot.save_figure(SimpleNamespace(savefig=savefig), old, dpi=0)

@@ -11,7 +11,8 @@ from glider_stream import planner
 from glider_stream.errors import InputError
 from glider_stream.export import EXPORTS
 from glider_stream.kernels.edges import Status
-from glider_stream.query import Planner, load_path
+from glider_stream.path import load_path
+from glider_stream.query import Planner
 from glider_stream.scenario import read_scenario, scenario_from_text
 from glider_stream.store import write_roadmap
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..settings import require
-from ..store import replacing
+from ..store import check_output, replacing
 
 if TYPE_CHECKING:
     from matplotlib.colors import ListedColormap
@@ -104,11 +104,12 @@ def thinned(count: int, most: int) -> NDArray[np.intp]:
 
 
 def check_figure(path: str | Path) -> str:
-    """The ending of a figure's file; InputError unless it is one that can be written."""
+    """The ending of a figure's file; InputError unless it is one that can be drawn, and the file can be made."""
     suffix = Path(path).suffix.lower()
     known = ", ".join(NO_CLOCK)
     got = repr(suffix or "no ending")
     require(suffix in NO_CLOCK, f"the figure {path} must end in one of: {known}; got {got}")
+    check_output(path)
     return suffix
 
 

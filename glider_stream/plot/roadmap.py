@@ -8,7 +8,7 @@ from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from .canvas import INK, colours, frozen, new_figure, said_time, styled, thinned, time_unit
-from .water import MAX_NODES, Frame, draw_current, draw_space, frame_of
+from .water import MAX_NODES, Frame, checked_depths, draw_current, draw_space, frame_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,22 +20,29 @@ DIVE, CLIMB = "#3b2a8c", "#f0a04b"
 
 
 def plot_roadmap(
-    flow: Flow, terrain: Terrain, problem: "Problem", roadmap: "Roadmap", title: str = ""
+    flow: Flow,
+    terrain: Terrain,
+    problem: "Problem",
+    roadmap: "Roadmap",
+    depth: float | None = None,
+    title: str = "",
 ) -> "Figure":
-    """Draw a roadmap: map, ways out of each node, edge times, steering, counts.
+    """Draw a roadmap: map at a `depth` [m], the top if None; ways out of each node, edge times, steering, counts.
 
-    Of `problem`, the box `lo`, `hi` [m] and the `departure` [s] are read: the time of the map.
+    Of `problem`, the box `lo`, `hi` [m], the `departure` [s], which is the time of the map, and `to_lonlat`
+    are read.
     """
     with styled():
         frame = frame_of(problem, roadmap.position)
-        figure = new_figure(14.0, 8.2, title or "Roadmap")
+        depth = frame.top if depth is None else checked_depths([depth], frame)[0]
+        figure = new_figure(14.0, 8.2, f"{title}: roadmap" if title else "Roadmap")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.12), wspace=0.02)
         left, right = halves
         ax = left.add_subplot()
-        image = draw_current(ax, flow, terrain, frame, frame.top, problem.departure, pale=0.5, arrows=24)
+        image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.5, arrows=24)
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
-        _draw_edges(ax, frame, roadmap, f"over the current at {frame.top:.4g} m{when}")
+        _draw_edges(ax, frame, roadmap, f"over the current at {depth:.4g} m{when}")
         _draw_degree(right.add_subplot(2, 2, 1, projection="3d"), terrain, frame, roadmap)
         _draw_facts(right.add_subplot(2, 2, 2), roadmap)
         _draw_times(right.add_subplot(2, 2, 3), roadmap)
@@ -67,8 +74,9 @@ def _draw_edges(ax: Any, frame: Frame, roadmap: "Roadmap", over: str) -> None:
     lines.set_array(times[drawn])
     ax.add_collection(lines)
     nodes = places[thinned(len(places), MAX_NODES)]
-    ax.scatter(*nodes.T, s=5, color=INK, linewidths=0, zorder=5)
-    ax.set(xlabel=f"East ({frame.name})", ylabel=f"North ({frame.name})")
+    # many nodes would hide the edges between them
+    ax.scatter(*nodes.T, s=min(5.0, 2500.0 / len(nodes)), color=INK, linewidths=0, zorder=5)
+    ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
     which = "All" if drawn.size == edges else f"{drawn.size:,} of {edges:,}"
     ax.set_title(f"(a) {which} edges {over}")
     if edges:

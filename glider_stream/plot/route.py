@@ -10,16 +10,18 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..settings import require
 from .canvas import GREY, INK, Array, colours, frozen, new_figure, said_time, styled, time_unit
-from .water import Frame, draw_current, draw_ends, draw_space, frame_of, sample_field, stretch
+from .water import Frame, checked_depths, draw_current, draw_ends, draw_space, frame_of, sample_field, stretch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..query import Path
+    from ..path import Path
     from ..roadmap import Problem
 
 MAX_MAPS, MAX_NUMBERS, ARROWS = 4, 40, 44
+MAPS_ROOM = 4.9, 5.6  # inches across and up
+LONGEST_ARROW = 0.4  # inches, in the profile
 SURFACED = 0.02  # of the deepest depth: a leg that ends above it ends at the surface
 
 
@@ -27,10 +29,21 @@ def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) ->
     """The depths [m] of the maps: those asked for, else the nodes' own if few, else evenly spread ones."""
     if depths is not None:
         require(1 <= len(depths) <= MAX_MAPS, f"`depths` must name 1 to {MAX_MAPS} depths; got {len(depths)}")
-        require(min(depths) >= 0, f"`depths` [m] are downward, 0 or more; got {min(depths):g}")
-        return np.unique(np.asarray(depths, np.float64))
+        return np.unique(checked_depths(depths, frame))
     own = np.unique(np.round(-position[:, 2], 1) + 0.0)
     return own if own.size <= MAX_MAPS else np.round(np.linspace(frame.top, frame.bottom, MAX_MAPS))
+
+
+def map_columns(count: int, frame: Frame) -> tuple[int, float]:
+    """In how many columns `count` maps of a frame are drawn largest, and the share of the width they fill."""
+    width, height = frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]
+    across, up = MAPS_ROOM
+
+    def scale(columns: int) -> float:
+        return min(across / (columns * width), up / (-(-count // columns) * height))
+
+    best = max(range(1, count + 1), key=scale)
+    return best, scale(best) * best * width / across
 
 
 def plot_route(
@@ -44,7 +57,8 @@ def plot_route(
 ) -> "Figure":
     """Draw a path among the nodes `position` (n, 3) [m], over the current at up to four `depths` [m].
 
-    Of `problem`, the box `lo`, `hi` [m] and the `departure` [s] are read: the time of the maps.
+    Of `problem`, the box `lo`, `hi` [m], the `departure` [s], which is the time of the maps, and `to_lonlat`
+    are read.
     """
     require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
     with styled():
@@ -56,12 +70,13 @@ def plot_route(
         norm = Normalize(frame.top, frame.bottom)
         said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         figure = new_figure(13.0, 9.8, f"{title}: {said}" if title else f"Route: {said}")
-        grid = figure.add_gridspec(2, 3, height_ratios=(2.4, 1.0), width_ratios=(1.0, 0.03, 1.15))
+        levels = map_depths(position, frame, depths)
+        columns, filled = map_columns(levels.size, frame)
+        right = 0.4 + 0.75 * filled
+        grid = figure.add_gridspec(2, 3, height_ratios=(2.4, 1.0), width_ratios=(2.15 - right, 0.03, right))
         space = figure.add_subplot(grid[0, 0], projection="3d")
         draw_space(space, terrain, frame, position, label="node")
         _draw_flight(space, frame, rows, stops, norm)
-        levels = map_depths(position, frame, depths)
-        columns = 1 if levels.size == 1 else 2
         cells = grid[0, 2].subgridspec(-(-levels.size // columns), columns)
         maps = [figure.add_subplot(cells[n // columns, n % columns]) for n in range(levels.size)]
         for n, (ax, depth) in enumerate(zip(maps, levels, strict=True)):
@@ -69,7 +84,7 @@ def plot_route(
             when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
             ax.set_title(f"{'(b) ' if n == 0 else ''}Current at {depth:.4g} m{when}")
             below, left = n + columns >= levels.size, n % columns == 0
-            ax.set(xlabel=f"East ({frame.name})" * below, ylabel=f"North ({frame.name})" * left)
+            ax.set(xlabel=frame.labels[0] * below, ylabel=frame.labels[1] * left)
             ax.tick_params(labelbottom=below, labelleft=left)
             _draw_track(ax, frame, rows, stops, depth, norm)
         _share_colours(figure, maps)
@@ -100,8 +115,9 @@ def _draw_flight(ax: Any, frame: Frame, rows: Array, stops: Array, norm: Any) ->
             look = {"edgecolors": INK, "facecolors": "white", "linewidths": 0.9, "depthshade": False}
             ax.scatter(*between[mask].T, marker=marker, s=26, label=label, zorder=6, **look)
     draw_ends(ax, ends)
+    ax.plot([], [], color=INK, linewidth=3.2, label="near the depth of a map")
     ax.set_title(f"(a) The route in space, {stretch(frame)}", loc="left")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3, frameon=False, fontsize=8)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, frameon=False, fontsize=8)
 
 
 def _draw_track(ax: "Axes", frame: Frame, rows: Array, stops: Array, depth: float, norm: Any) -> None:
@@ -128,7 +144,8 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
     unit, name = time_unit(float(rows[-1, 0] - rows[0, 0]))
     time, depth = rows[:, 0] / unit, -rows[:, 3] + 0.0
     span = max(float(np.ptp(depth)), 1.0)
-    ax.set(xlim=(time[0], time[-1]), ylim=(depth.max() + 0.2 * span, depth.min() - 0.32 * span))
+    # above the leg numbers, below the arrows of the deepest point
+    ax.set(xlim=(time[0], time[-1]), ylim=(depth.max() + 0.32 * span, depth.min() - 0.4 * span))
     ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
     ax.plot(time, depth, color="white", linewidth=4.0, zorder=4)
     line = ax.add_collection(_route(np.column_stack([time, depth]), depth, norm, 2.4))
@@ -148,10 +165,10 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
     fastest = float(np.nanmax(np.hypot(u, v), initial=0.0)) or 1.0
     power = 10.0 ** np.floor(np.log10(fastest))
     key = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= fastest)
-    look = {"angles": "uv", "scale_units": "inches", "scale": fastest / 0.5, "width": 0.0016, "zorder": 8}
-    arrows = ax.quiver(at / unit, -z, u, v, color=INK, headwidth=4.5, **look)
+    look = {"angles": "uv", "scale_units": "inches", "scale": fastest / LONGEST_ARROW, "width": 0.0016}
+    arrows = ax.quiver(at / unit, -z, u, v, color=INK, headwidth=4.5, zorder=8, **look)
     ax.quiverkey(arrows, 0.95, 1.065, key, f"{key:g} m/s", labelpos="W", coordinates="axes")
-    ax.set_yticks([tick for tick in ax.get_yticks() if 0.0 <= tick <= depth.max() + 0.2 * span])
+    ax.set_yticks([tick for tick in ax.get_yticks() if 0.0 <= tick <= depth.max() + 0.3 * span])
     ax.set(xlabel=f"Time since departure ({name})", ylabel="Depth (m)")
     ax.set_title("(c) Depth against time, legs numbered; arrows: the horizontal current on the way, north up")
     bar = ax.figure.colorbar(line, ax=ax, label="Depth of the route (m)", aspect=12, pad=0.01)

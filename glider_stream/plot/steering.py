@@ -106,7 +106,7 @@ def plot_steering(problem: "Problem", position: Array, start: Array, goal: Array
 
 def _draw_water(ax: Any, evaluator: Evaluator, problem: "Problem", frame: Frame, height: float) -> None:
     draw_current(ax, evaluator.flow, evaluator.terrain, frame, -height, problem.departure, pale=0.65, arrows=20)
-    ax.set(xlabel=f"East ({frame.name})", ylabel=f"North ({frame.name})")
+    ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
 
 
 def _draw_paths(

@@ -1,5 +1,6 @@
 """The water of a figure: current and land on a map, the box in space."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..kernels.cache import entry_point
 from ..kernels.flow import Flow, contains, velocity
 from ..kernels.terrain import Terrain, allowed
+from ..settings import require
 from .canvas import GREY, INK, Array, Side, colours, length_unit, thinned
 
 if TYPE_CHECKING:
@@ -51,7 +53,10 @@ def sample_water(terrain: Terrain, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> 
 
 
 class Frame(NamedTuple):
-    """The box of a figure: sides x, y [m], depths `top` and `bottom` [m] downward, the unit of length."""
+    """The box of a figure: sides x, y [m], depths `top` and `bottom` [m] downward, the unit of length.
+
+    `labels` of the axes toward east and north: from where, in degrees, where the scenario is geographic.
+    """
 
     x: Side
     y: Side
@@ -59,6 +64,7 @@ class Frame(NamedTuple):
     bottom: float
     unit: float
     name: str
+    labels: tuple[str, str]
 
     def mesh(self, count: int) -> tuple[Array, Array]:
         """Cell centres, `count` along the longer side, in square cells."""
@@ -81,7 +87,25 @@ def frame_of(problem: "Problem", points: Array) -> Frame:
     low, high = np.minimum(problem.lo, points.min(axis=0)), np.maximum(problem.hi, points.max(axis=0))
     x, y = (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
     top, bottom = float(-high[2]) + 0.0, float(-low[2])
-    return Frame(x, y, top, max(bottom, top + 1e-9), *length_unit(x, y))
+    unit, name = length_unit(x, y)
+    labels = f"East ({name})", f"North ({name})"
+    if problem.to_lonlat is not None:
+        lon, lat = problem.to_lonlat(np.zeros((1, 3)))[0]
+        labels = f"East of {degrees(lon, 'EW')} ({name})", f"North of {degrees(lat, 'NS')} ({name})"
+    return Frame(x, y, top, max(bottom, top + 1e-9), unit, name, labels)
+
+
+def degrees(angle: float, letters: str) -> str:
+    """An angle [degrees] with the letter of its side, as on a chart."""
+    return f"{abs(angle):.4f}° {letters[int(angle < 0)]}"
+
+
+def checked_depths(depths: Sequence[float], frame: Frame) -> Array:
+    """Depths [m] of maps; InputError where the scenario knows no current: above the surface, below its box."""
+    for depth in depths:
+        fits = 0.0 <= depth <= frame.bottom
+        require(fits, f"`depth` must be from 0 m to {frame.bottom:g} m, the domain's deepest; got {depth:g}")
+    return np.asarray(depths, np.float64)
 
 
 def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:

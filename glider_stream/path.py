@@ -1,0 +1,162 @@
+"""Paths: legs from a start to a goal, for people and programs, and back out of a path file."""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .settings import require
+
+Array = NDArray[np.float64]
+LARGEST = 1e12
+"""A number [m, s] in a path file beyond it is no place or time on Earth."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One glide, with one trim: from `start` to `end` (3,) [m]; the nodes it was planned between.
+
+    `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
+    `lonlat` (2, 2) [degrees] of start and end, where the scenario is geographic.
+    """
+
+    start: Array
+    end: Array
+    glide_angle: float
+    heading: float
+    speed: float
+    depart: float
+    duration: float
+    miss: float
+    trajectory: Array
+    lonlat: Array | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the path file has it."""
+        return {
+            "from": self.start.tolist(),
+            "to": self.end.tolist(),
+            "glide_angle_rad": self.glide_angle,
+            "heading_rad": self.heading,
+            "speed_mps": self.speed,
+            "depart_s": self.depart,
+            "duration_s": self.duration,
+            "miss_m": self.miss,
+            "trajectory": self.trajectory.tolist(),
+        }
+
+    def __str__(self) -> str:
+        way, glide = "climb" if self.glide_angle > 0 else "dive ", math.degrees(self.glide_angle)
+        compass = math.degrees(math.pi / 2 - self.heading) % 360
+        # a geographic scenario speaks of depths, any other of heights
+        begin, end = (z if self.lonlat is None else 0.0 - z for z in (self.start[2], self.end[2]))
+        there = "" if self.lonlat is None else "  at {:.4f}, {:.4f}".format(*self.lonlat[1])
+        return (
+            f"{self.depart:9,.0f} s  {way} {begin:7.0f} m to {end:6.0f} m{there}  "
+            f"glide {glide:6.1f} deg  compass {compass:5.1f} deg  "
+            f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
+        )
+
+
+@dataclass(frozen=True)
+class Path:
+    """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
+
+    From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic.
+    """
+
+    start: Array
+    goal: Array
+    cost: float
+    legs: tuple[Leg, ...]
+    lonlat: Array | None = None
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a path."""
+        return math.isfinite(self.cost)
+
+    @property
+    def travel_time(self) -> float:
+        """Time from start to goal [s]; inf where there is no path."""
+        return sum((leg.duration for leg in self.legs), 0.0) if self.found else math.inf
+
+    @property
+    def trajectory(self) -> Array:
+        """All legs' rows [t, x, y, z], (m, 4)."""
+        return np.concatenate([np.empty((0, 4)), *(leg.trajectory for leg in self.legs)])
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the path file has it."""
+        return {
+            "found": self.found,
+            "travel_time_s": self.travel_time if self.found else None,
+            "cost": self.cost if self.found else None,
+            "legs": [leg.as_dict() for leg in self.legs],
+        }
+
+    def __str__(self) -> str:
+        if self.lonlat is None:
+            start, goal = (f"({x:.6g}, {y:.6g}, {z:.6g})" for x, y, z in (self.start, self.goal))
+        else:
+            ends = zip(self.lonlat, (self.start, self.goal), strict=True)
+            start, goal = (f"({lon:.4f}, {lat:.4f}, {0.0 - z:.6g} m)" for (lon, lat), (_, _, z) in ends)
+        if not self.found:
+            return f"no path from {start} to {goal}; more nodes, neighbours or candidates may find one"
+        count = f"{len(self.legs)} leg{'' if len(self.legs) == 1 else 's'}"
+        hours = f" ({self.travel_time / 3600:.1f} h)" if self.travel_time >= 7200 else ""
+        title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s{hours}"
+        return "\n".join([title, *(f"  {leg}" for leg in self.legs)])
+
+
+def load_path(file: str | File) -> Path:
+    """Read a path file (JSON) that `query` wrote; InputError where it is not one, or holds no leg."""
+    try:
+        table = json.loads(File(file).read_text(encoding="utf-8"))
+        require(isinstance(table, dict) and isinstance(table.get("legs"), list), "it has no list `legs`")
+        require(len(table["legs"]) > 0, "it holds no leg, so there is nothing to draw")
+        require(table.get("found") is True, f"its `found` is {table.get('found')!r}, yet it has legs")
+        legs = tuple(_read_leg(leg, f"leg {n}") for n, leg in enumerate(table["legs"], 1))
+        cost = float(_numbers(table, "cost", "the path"))
+        clock = np.concatenate([[0.0], *(leg.trajectory[:, 0] for leg in legs)])
+        require(bool((np.diff(clock) >= 0).all()), "the times of its trajectory do not rise from 0")
+        require(bool(clock[-1] > 0), "it takes no time")
+    except (OSError, ValueError, RecursionError) as error:
+        said = f"it is no JSON text, {error}"
+        if isinstance(error, OSError):
+            said = (error.strerror or "it is no file").lower()
+        elif isinstance(error, InputError):
+            said = str(error)
+        raise InputError(f"the path file {file} cannot be read: {said}; write it with `query -o`") from None
+    return Path(legs[0].start, legs[-1].end, cost, legs)
+
+
+def _read_leg(leg: Any, where: str) -> Leg:
+    require(isinstance(leg, dict), f"{where} is no table")
+    names = ("glide_angle_rad", "heading_rad", "speed_mps", "depart_s", "duration_s", "miss_m")
+    angle, heading, speed, depart, duration, miss = (float(_numbers(leg, name, where)) for name in names)
+    require(min(speed, depart, duration, miss) >= 0, f"{where} has a speed, time or miss below 0")
+    start, end = (_numbers(leg, name, where, 3) for name in ("from", "to"))
+    rows = _numbers(leg, "trajectory", where, None, 4)
+    return Leg(start, end, angle, heading, speed, depart, duration, miss, rows)
+
+
+def _numbers(table: dict[str, Any], key: str, where: str, *shape: int | None) -> Array:
+    """The finite numbers under a key, of a shape; None for any length above 0."""
+    require(key in table, f"{where} has no `{key}`")
+    try:
+        values = np.array(table[key], np.float64)
+    except (TypeError, ValueError, OverflowError):
+        values = np.array(math.nan)
+    fits = values.ndim == len(shape) and all(
+        have == want or (want is None and have > 0) for have, want in zip(values.shape, shape, strict=True)
+    )
+    said = " x ".join("n" if size is None else str(size) for size in shape) or "one"
+    fits = fits and float(np.abs(values).max()) <= LARGEST  # False for NaN, too
+    require(fits, f"`{key}` of {where} must be finite numbers, {said} of them")
+    return values
