@@ -14,7 +14,7 @@ from .query import Planner, check_unchanged
 from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .settings import require
-from .store import check_output, read_roadmap, write_roadmap
+from .store import build_file, check_output, read_roadmap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,10 +41,10 @@ def build(
         itself = output is not None and realpath(output) == realpath(scenario)
         require(not itself, f"the output {output} is the scenario itself; name another file")
         resolved = read_scenario(scenario, overrides)
-    roadmap = build_roadmap(resolved.problem(), threads, progress)
-    if output is not None:
-        write_roadmap(roadmap, output)
-    return roadmap
+    if output is None:
+        return build_roadmap(resolved.problem(), threads, progress)
+    build_file(resolved.problem(), output, threads, progress)
+    return read_roadmap(output)
 
 
 def info(roadmap: str | File | Roadmap) -> Roadmap:

@@ -102,6 +102,27 @@ class Provenance:
 
 
 @dataclass(frozen=True)
+class Edges:
+    """Edges of consecutive nodes: the `degree` of each (nodes,), `target` (edges,), rising within a node's.
+
+    `values` (edges, 6): the numbers of each edge, in the order of EDGE_FIELDS.
+    """
+
+    degree: Index
+    target: NDArray[np.int32]
+    values: Array
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What a build has looked at: pairs by status, wall time [s] without compilation, threads."""
+
+    counts: dict[str, int]
+    wall_s: float
+    threads: int
+
+
+@dataclass(frozen=True)
 class Roadmap:
     """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
 
@@ -184,22 +205,21 @@ def warm_up(problem: Problem) -> None:
     problem.legs(problem.lo[None]).of(0, 1)
 
 
-def build_roadmap(
+def find_edges(
     problem: Problem,
+    position: Array,
+    keep: Callable[[Edges], None],
     thread_count: int | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
-) -> Roadmap:
-    """Evaluate all neighbour pairs of a problem, in batches of whole nodes of some `batch_pairs` pairs.
+) -> Tally:
+    """Evaluate all neighbour pairs of nodes (n, 3) [m], in batches of whole nodes of some `batch_pairs` pairs.
 
-    Neither the number of threads nor the batch size changes a bit of the result.
+    Each batch's edges are handed to `keep`, in order, and forgotten. Neither the number of threads nor the
+    batch size changes a bit of the result.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
-    position = node_positions(problem)
-    legs = problem.legs(position)
-    nodes = len(position)
-    degree = np.zeros(nodes, np.int64)
-    found: list[tuple[Index, Array]] = []
+    legs, nodes = problem.legs(position), len(position)
     counts = dict.fromkeys((status.name.lower() for status in Status), 0)
     with threads(thread_count) as used:
         warm_up(problem)
@@ -208,27 +228,44 @@ def build_roadmap(
         while first < nodes:
             batch = legs.of(first, batch_pairs)
             connected = batch.outcomes[:, 0] == Status.CONNECTED
-            source = np.arange(first, first + len(batch.indptr) - 1)
-            np.add.at(degree, np.repeat(source, np.diff(batch.indptr))[connected], 1)
-            found.append((batch.target[connected], batch.outcomes[connected, 1:]))
+            degree = np.diff(np.concatenate([[0], np.cumsum(connected)])[batch.indptr])
+            target = batch.target[connected].astype(np.int32)
+            keep(Edges(degree, target, batch.outcomes[connected, 1:]))
             for name, count in count_statuses(batch.outcomes).items():
                 counts[name] += count
-            first, looked = first + source.size, looked + batch.target.size
+            first, looked = first + degree.size, looked + batch.target.size
             total = looked + round(looked / first * (nodes - first))
             progress(Progress(looked, total, counts["connected"], time.perf_counter() - began))
-        wall = time.perf_counter() - began
-    edges = np.concatenate([rows for _, rows in found])
+        return Tally(counts, time.perf_counter() - began, used)
+
+
+def build_roadmap(
+    problem: Problem,
+    thread_count: int | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+    batch_pairs: int = BATCH_PAIRS,
+) -> Roadmap:
+    """A problem's roadmap, in memory; see `find_edges`, and `store.build_file` for one on disk."""
+    position = node_positions(problem)
+    parts: list[Edges] = []
+    tally = find_edges(problem, position, parts.append, thread_count, progress, batch_pairs)
+    columns = {name: np.concatenate([part.values[:, n] for part in parts]) for n, name in enumerate(EDGE_FIELDS)}
     return Roadmap(
         position=position,
-        indptr=np.concatenate([[0], np.cumsum(degree)]),
-        target=np.concatenate([target for target, _ in found]).astype(np.int32),
-        counts=counts,
+        indptr=np.concatenate([[0], np.cumsum(np.concatenate([part.degree for part in parts]))]),
+        target=np.concatenate([part.target for part in parts]),
         provenance=provenance_of(problem),
-        wall_s=wall,
-        threads=used,
-        lonlat=None if problem.to_lonlat is None else problem.to_lonlat(position),
-        **{name: np.ascontiguousarray(edges[:, n]) for n, name in enumerate(EDGE_FIELDS)},
+        lonlat=lonlat_of(problem, position),
+        counts=tally.counts,
+        wall_s=tally.wall_s,
+        threads=tally.threads,
+        **columns,
     )
+
+
+def lonlat_of(problem: Problem, position: Array) -> Array | None:
+    """Longitude and latitude [degrees] of nodes (n, 3) [m], where the scenario is geographic."""
+    return None if problem.to_lonlat is None else problem.to_lonlat(position)
 
 
 def provenance_of(problem: Problem) -> Provenance:

@@ -1,23 +1,41 @@
 """The roadmap file: HDF5, format version 1. Nothing else knows h5py."""
 
 import contextlib
+import io
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import InputError
 from .kernels.edges import Status
-from .roadmap import EDGE_FIELDS, Provenance, Roadmap
+from .roadmap import (
+    BATCH_PAIRS,
+    EDGE_FIELDS,
+    Edges,
+    Problem,
+    Progress,
+    Provenance,
+    Roadmap,
+    Tally,
+    find_edges,
+    lonlat_of,
+    node_positions,
+    provenance_of,
+)
 from .settings import require
 
+Array = NDArray[Any]
 FORMAT = "glider-stream/roadmap"
 VERSION = 1
+CHUNK = 32768
+"""Edges in a chunk of a dataset, 256 kB: one is checked and cached whole."""
 
 _DESCRIBED = {
     "nodes/position": ("f8", "m", "node position: x east, y north, z upward from the surface"),
@@ -78,40 +96,125 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
-    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
-    # made in memory: where the disk is full, HDF5 can neither write a file nor close it
-    with h5py.File(Path(path).name, "w", driver="core", backing_store=False) as file:
-        _write(file, roadmap)
-        file.flush()
-        image = file.id.get_file_image()
-    with replacing(Path(path)) as temporary:
-        temporary.write_bytes(image)
+class Guarded(io.FileIO):
+    """A file for HDF5 that takes whatever is written: HDF5 can close no file on a full disk.
+
+    What went wrong first is kept in `error`, to be raised when HDF5 does not look.
+    """
+
+    error: OSError | None = None
+
+    def write(self, part: Any) -> int:
+        """Write all of `part`, or pretend to."""
+        whole = memoryview(part).nbytes
+        done = 0
+        while self.error is None and done < whole:
+            try:
+                done += super().write(memoryview(part)[done:])
+            except OSError as error:
+                self.error = error
+        return whole
+
+    def check(self) -> None:
+        """Raise what went wrong."""
+        if self.error is not None:
+            raise self.error
 
 
-def _write(file: h5py.File, roadmap: Roadmap) -> None:
-    arrays: dict[str, Any] = {"nodes/position": roadmap.position, "edges/indptr": roadmap.indptr}
-    arrays |= {f"edges/{name}": getattr(roadmap, name) for name in ("target", *EDGE_FIELDS)}
-    if roadmap.lonlat is not None:
-        arrays["nodes/lonlat"] = roadmap.lonlat
-    file.attrs["format"] = FORMAT
-    file.attrs["format_version"] = VERSION
-    for name, value in asdict(roadmap.provenance).items():
-        file.attrs[name] = value
-    for name, array in arrays.items():
+class RoadmapWriter:
+    """An open roadmap file that takes its edges batch by batch, in the order of their source nodes."""
+
+    def __init__(
+        self, disk: Guarded, file: h5py.File, position: Array, lonlat: Array | None, made: Provenance
+    ) -> None:
+        """Write what is known before the edges are."""
+        self._disk, self._file = disk, file
+        self._waiting: list[Edges] = []
+        self._degree: list[Array] = []
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = VERSION
+        for name, value in asdict(made).items():
+            file.attrs[name] = value
+        self._put("nodes/position", position)
+        if lonlat is not None:
+            self._put("nodes/lonlat", lonlat)
+
+    def append(self, edges: Edges) -> None:
+        """Take the edges of the next nodes."""
+        self._degree.append(edges.degree)
+        self._waiting.append(edges)
+        if sum(one.target.size for one in self._waiting) >= CHUNK:
+            self._flush()
+
+    def finish(self, tally: Tally) -> None:
+        """Write what is known after the edges are, and declare the file complete."""
+        self._flush()
+        degree = np.concatenate([np.zeros(1, np.int64), *self._degree])
+        self._put("edges/indptr", np.cumsum(degree))
+        pairs = self._file.create_group("pairs")
+        pairs.attrs["evaluated"] = sum(tally.counts.values())
+        for name, count in tally.counts.items():
+            pairs.attrs[name] = count
+        pairs.attrs["wall_s"] = tally.wall_s
+        pairs.attrs["threads"] = tally.threads
+        self._file.attrs["complete"] = True
+
+    def _flush(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        values = np.concatenate([np.empty((0, len(EDGE_FIELDS))), *(one.values for one in waiting)])
+        self._put("edges/target", np.concatenate([np.empty(0, np.int32), *(one.target for one in waiting)]))
+        for n, name in enumerate(EDGE_FIELDS):
+            self._put(f"edges/{name}", values[:, n])
+        self._file.flush()
+        self._disk.check()
+
+    def _put(self, name: str, rows: Array) -> None:
+        """Append rows to a dataset, which is made if there is none."""
         kind, unit, words = _DESCRIBED[name]
-        # a dataset without elements cannot be chunked, and so not be checksummed
-        checked = {"fletcher32": True, "chunks": True} if array.size else {}
-        dataset = file.create_dataset(name, data=array.astype(kind), **checked)
+        if name in self._file:
+            dataset = self._file[name]
+            before = len(dataset)
+            dataset.resize(before + len(rows), axis=0)
+            dataset[before:] = rows
+            return
+        # checksums need chunks, and chunks an element
+        chunks = (max(1, min(CHUNK, len(rows))), *rows.shape[1:])
+        more = {"maxshape": (None, *rows.shape[1:]), "chunks": chunks, "fletcher32": True}
+        dataset = self._file.create_dataset(name, data=np.asarray(rows, kind), **more)
         dataset.attrs["units"] = unit
         dataset.attrs["long_name"] = words
-    pairs = file.create_group("pairs")
-    pairs.attrs["evaluated"] = roadmap.evaluated
-    for name, count in roadmap.counts.items():
-        pairs.attrs[name] = count
-    pairs.attrs["wall_s"] = roadmap.wall_s
-    pairs.attrs["threads"] = roadmap.threads
-    file.attrs["complete"] = True
+
+
+@contextlib.contextmanager
+def _writing(
+    path: str | Path, position: Array, lonlat: Array | None, made: Provenance
+) -> Iterator[RoadmapWriter]:
+    """A roadmap file in the making; at `path` when the block ends well, and not at all else."""
+    with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
+        with h5py.File(disk, "w") as file:
+            yield RoadmapWriter(disk, file, position, lonlat, made)
+        disk.check()
+
+
+def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
+    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
+    values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
+    with _writing(path, roadmap.position, roadmap.lonlat, roadmap.provenance) as file:
+        file.append(Edges(np.diff(roadmap.indptr), roadmap.target, values))
+        file.finish(Tally(roadmap.counts, roadmap.wall_s, roadmap.threads))
+
+
+def build_file(
+    problem: Problem,
+    path: str | Path,
+    thread_count: int | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+    batch_pairs: int = BATCH_PAIRS,
+) -> None:
+    """Build a problem's roadmap into a file, batch by batch: memory holds the nodes and one batch of edges."""
+    position = node_positions(problem)
+    with _writing(path, position, lonlat_of(problem, position), provenance_of(problem)) as file:
+        file.finish(find_edges(problem, position, file.append, thread_count, progress, batch_pairs))
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
@@ -154,7 +257,7 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
         stored = np.asarray(file[name][()])
         fits = stored.dtype.kind == np.dtype(kind).kind
         require(fits, f"the roadmap {path} is damaged: {name} is {stored.dtype}, not {kind}; build it again")
-        arrays[name] = stored.astype(kind)
+        arrays[name] = stored.astype(kind, copy=False)
         finite = bool(np.isfinite(arrays[name]).all())
         require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
     position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]

@@ -55,6 +55,15 @@ def assert_same(a, b):
             assert one == other, field.name
 
 
+@pytest.mark.parametrize(("chunk", "batch"), [(1, 1), (7, 30), (100, 250), (store.CHUNK, 10**6)])
+def test_a_file_written_in_batches_is_the_roadmap(tmp_path, monkeypatch, chunk, batch):
+    monkeypatch.setattr(store, "CHUNK", chunk)
+    scenario = scenario_file(tmp_path)
+    store.build_file(read_scenario(scenario).problem(), tmp_path / "road.h5", batch_pairs=batch)
+    road = read_roadmap(tmp_path / "road.h5")
+    assert_same(replace(road, provenance=None, wall_s=0.0), replace(roadmap(), provenance=None, wall_s=0.0))
+
+
 def without_edges(road):
     none = {name: np.empty(0) for name in ("time", "cost", "glide_angle", "heading", "speed", "miss")}
     return replace(road, indptr=np.zeros_like(road.indptr), target=np.empty(0, np.int32), **none)
@@ -177,12 +186,10 @@ def test_a_writer_that_fails_leaves_the_old_file(file, monkeypatch):
 KILLED = """
 import os, signal, sys
 from glider_stream import planner, store
-write = store._write
-def half(file, roadmap):
-    write(file, roadmap)
-    file.flush()
+def half(file, tally):
+    file._flush()
     os.kill(os.getpid(), signal.SIGKILL)
-store._write = half
+store.RoadmapWriter.finish = half
 planner.build(sys.argv[1], sys.argv[2])
 """
 
