@@ -7,6 +7,7 @@ from numba import njit
 
 from glider_stream.kernels.cache import entry_point
 from glider_stream.kernels.control import glide_speed
+from glider_stream.kernels.flow import contains
 from glider_stream.kernels.motion import rk4_step
 
 
@@ -27,6 +28,23 @@ def land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
 
 
 @njit
+def stays(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
+    """Whether every step of a control's path to a depth begins where the flow is known."""
+    speed = glide_speed(polar, direction, angle)
+    u = speed * math.cos(angle) * math.cos(heading)
+    v = speed * math.cos(angle) * math.sin(heading)
+    w = (2.0 * direction - 1.0) * speed * math.sin(angle)
+    duration = (z_q - z) / w
+    n = 0
+    while n * dt < duration:
+        if not contains(flow, x, y, t + n * dt):
+            return False
+        x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, min(dt, duration - n * dt))
+        n += 1
+    return True
+
+
+@njit
 def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt, horizon):
     """Travel time of the solution that damped Newton steps lead to [s]; inf where they do not close in."""
     low, high = polar.shallowest[direction], polar.steepest[direction]
@@ -35,7 +53,8 @@ def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt
         off_x, off_y = x_0 - x_q, y_0 - y_q
         miss = math.hypot(off_x, off_y)
         if miss < 0.002:
-            return duration if duration <= horizon else math.inf
+            known = stays(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt)
+            return duration if known and duration <= horizon else math.inf
         e = 1e-5 if angle + 1e-5 < high else -1e-5
         x_a, y_a, _ = land(flow, polar, direction, x, y, z, z_q, t, angle + e, heading, dt)
         x_h, y_h, _ = land(flow, polar, direction, x, y, z, z_q, t, angle, heading + 1e-5, dt)
