@@ -44,7 +44,8 @@ class NodeBins(NamedTuple):
 
 
 @inlined
-def _bin_range(low, high, origin, per_bin, count):
+def bin_range(low, high, origin, per_bin, count):
+    """The bins of one axis that hold low..high [m]: the first and the last, the outermost ones at least."""
     first = int(min(max((low - origin) * per_bin, 0.0), count - 1.0))
     last = int(min(max((high - origin) * per_bin, 0.0), count - 1.0))
     return first, last
@@ -53,8 +54,8 @@ def _bin_range(low, high, origin, per_bin, count):
 @kernel
 def any_wanted(bins, layer, position, wanted, x_lo, x_hi, y_lo, y_hi):
     """Whether a wanted node of the layer lies in the rectangle [m]."""
-    i_first, i_last = _bin_range(x_lo, x_hi, bins.x_lo, bins.per_bin, bins.nx)
-    j_first, j_last = _bin_range(y_lo, y_hi, bins.y_lo, bins.per_bin, bins.ny)
+    i_first, i_last = bin_range(x_lo, x_hi, bins.x_lo, bins.per_bin, bins.nx)
+    j_first, j_last = bin_range(y_lo, y_hi, bins.y_lo, bins.per_bin, bins.ny)
     for i in range(i_first, i_last + 1):
         row = (layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
@@ -187,8 +188,8 @@ def guess_in_patch(
     """
     x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
     room = MARGIN * max(x_hi - x_lo, y_hi - y_lo)
-    i_first, i_last = _bin_range(x_lo - room, x_hi + room, bins.x_lo, bins.per_bin, bins.nx)
-    j_first, j_last = _bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
+    i_first, i_last = bin_range(x_lo - room, x_hi + room, bins.x_lo, bins.per_bin, bins.nx)
+    j_first, j_last = bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
     p = patches[0] if bins.aligned else patches[2]
     for i in range(i_first, i_last + 1):
         row = (layer * bins.nx + i) * bins.ny

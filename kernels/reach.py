@@ -13,13 +13,15 @@ from .fan import FAN_ROWS, fan_guesses
 from .flight import LEFT, advance, hangar, stayed_inside, widen
 from .flow import contains
 from .motion import LANES, is_clear, stays_inside
-from .patch import ANGLE, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK
+from .patch import ANGLE, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, bin_range
 from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct
 
 MAX_TRIES = 12
 """Guesses that are polished for one node."""
 FAN_STEP = 3.0
 """Steps of a fan, in steps of a leg: it gives first guesses."""
+SPARE, LONGER = 1.3, 1.5
+"""A first deadline should suffice for SPARE times the limit; the next is LONGER times as long."""
 LATEST = 1.1
 """A guess that arrives later, in deadlines, is not polished."""
 INSIDE = 1e-9
@@ -155,32 +157,54 @@ def _take(medium, position, origin, departure, backward, tasks, guess, lanes, n)
 
 
 @kernel
-def first_deadline(bins, polar, direction, z, outward, limit, horizon):
-    """A time [s] in which a fan may pass over `limit` nodes: a share of the horizon, halved while that is enough.
+def nodes_near(bins, layer, x, y, radius):
+    """How many nodes of a layer may lie within a square around (x, y) [m]: its share of the bins that hold it."""
+    i_first, i_last = bin_range(x - radius, x + radius, bins.x_lo, bins.per_bin, bins.nx)
+    j_first, j_last = bin_range(y - radius, y + radius, bins.y_lo, bins.per_bin, bins.ny)
+    count = 0
+    for i in range(i_first, i_last + 1):
+        row = (layer * bins.nx + i) * bins.ny
+        count += bins.first[row + j_last + 1] - bins.first[row + j_first]
+    i, j, r = (x - bins.x_lo) * bins.per_bin, (y - bins.y_lo) * bins.per_bin, radius * bins.per_bin
+    across = min(i + r, i_last + 1.0) - max(i - r, float(i_first))
+    up = min(j + r, j_last + 1.0) - max(j - r, float(j_first))
+    share = across * up / ((i_last - i_first + 1.0) * (j_last - j_first + 1.0))
+    return count * max(share, 0.0)
+
+
+@kernel
+def nodes_swept(bins, polar, direction, x, y, z, outward, deadline):
+    """How many nodes a fan may pass over before the deadline [s].
 
     In still water a fan sweeps, at a height, the ring between its shallowest and its steepest glide; a current
     without divergence moves and bends it.
     """
-    bin_area = 1.0 / (bins.per_bin * bins.per_bin)
     steep = polar.steepest[direction]
     across = horizontal_speed(polar, direction, steep) / vertical_speed(polar, direction, steep)
-    deadline = horizon
-    while deadline > horizon / 512.0:
-        expected = 0.0
-        for layer in range(bins.levels.size):
-            rise = (bins.levels[layer] - z) * (2.0 * outward - 1.0)
-            angle = angle_of_vertical_speed(polar, direction, rise / (0.5 * deadline))
-            if rise <= 0.0 or math.isnan(angle):
-                continue
-            slow = vertical_speed(polar, direction, angle)
-            outer, inner = rise * horizontal_speed(polar, direction, angle) / slow, rise * across
-            row = layer * bins.nx * bins.ny
-            nodes = bins.first[row + bins.nx * bins.ny] - bins.first[row]
-            expected += math.pi * (outer * outer - inner * inner) * nodes / (bins.nx * bins.ny * bin_area)
-        if expected < limit:
-            break
-        deadline *= 0.5
-    return deadline
+    swept = 0.0
+    for layer in range(bins.levels.size):
+        rise = (bins.levels[layer] - z) * (2.0 * outward - 1.0)
+        angle = angle_of_vertical_speed(polar, direction, rise / deadline)
+        if rise <= 0.0 or math.isnan(angle):
+            continue
+        slow = vertical_speed(polar, direction, angle)
+        outer, inner = rise * horizontal_speed(polar, direction, angle) / slow, rise * across
+        ring = 0.25 * math.pi * (1.0 - (inner / outer) ** 2)
+        swept += ring * nodes_near(bins, layer, x, y, outer)
+    return swept
+
+
+@kernel
+def first_deadline(bins, polar, direction, x, y, z, outward, limit, horizon):
+    """A time [s] in which a fan may pass over somewhat more than `limit` nodes, within the horizon [s]."""
+    early, late = 0.0, horizon
+    for _ in range(8):
+        middle = 0.5 * (early + late)
+        if nodes_swept(bins, polar, direction, x, y, z, outward, middle) < SPARE * limit:
+            early = middle
+        else:
+            late = middle
+    return late
 
 
 @entry_point(nogil=True)
@@ -191,7 +215,7 @@ def reach_points(
     """The cheapest exact legs from the points origin[first:last] [m], left at `departure` [s], to nodes.
 
     To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with `backward` from
-    them. With a `limit`, a fan is cut at a deadline, which is doubled until that many of its legs arrive before
+    them. With a `limit`, a fan is cut at a deadline, which is put off until that many of its legs arrive before
     it; the fastest so many are kept of each direction. Into rows of `found` (n, capacity, node and fields of
     Edge); a count above the capacity says how much is needed.
     """
@@ -207,8 +231,10 @@ def reach_points(
             tasks[task, DONE] = 1.0
         elif limit > 0:
             outward = 1 - direction if backward else direction
-            z = origin[n, 2]
-            tasks[task, DEADLINE] = first_deadline(bins, medium.polar, direction, z, outward, limit, horizon)
+            x, y, z = origin[n]
+            tasks[task, DEADLINE] = first_deadline(
+                bins, medium.polar, direction, x, y, z, outward, limit, horizon
+            )
     guesses = np.empty((1024, GUESS_COLUMNS))
     while True:
         count = np.int64(0)  # not a literal: what takes it is compiled once
@@ -245,7 +271,7 @@ def reach_points(
                     _keep(rows[begin:end], limit, counts, found, int(tasks[task, ORIGIN]))
                     tasks[task, DONE] = 1.0
                 else:
-                    tasks[task, DEADLINE] = min(2.0 * tasks[task, DEADLINE], horizon)
+                    tasks[task, DEADLINE] = min(LONGER * tasks[task, DEADLINE], horizon)
                     waiting = True
             begin = end
         if not waiting:
