@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .domain import Point
+from .domain import Array, Point
 from .export import check_export, export_path
 from .path import Path, load_path
 from .query import Planner, check_unchanged
@@ -72,6 +72,17 @@ def query(
     for output in outputs:
         export_path(path, output)
     return path
+
+
+def table(roadmap: str | File | Roadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
+    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where there is none.
+
+    Points are given in the coordinates of the scenario's domain; see `query`.
+    """
+    road = info(roadmap)
+    scenario = scenario_from_text(road.provenance.scenario)
+    ends = ([scenario.domain.point(end) for end in some] for some in (starts, goals))
+    return Planner(road, scenario.problem()).table(*ends)
 
 
 def plot(

@@ -1,6 +1,8 @@
 """Queries: Dijkstra over a roadmap, a start and a goal attached to it."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +20,7 @@ from .settings import require
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 
 
 def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
@@ -32,6 +35,25 @@ def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
             f"the {name} has changed since the roadmap was built (its digest was {digest[:12]}, it is "
             f"{now[:12]} now); build the roadmap again",
         )
+
+
+@dataclass(frozen=True)
+class _End:
+    """An end of a query: its `point` (3,) [m], the nodes that lie there, often none, else its legs."""
+
+    point: Array
+    nodes: Index
+    legs: Attached | None
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The cheapest ways from a start: its number, cost and predecessor of every node, itself the last."""
+
+    start: _End
+    origin: int
+    cost: Array
+    before: NDArray[np.int32]
 
 
 class Planner:
@@ -49,40 +71,39 @@ class Planner:
         A point that is a node is used as it is; any other is attached by its own neighbours, and the leg
         from end to end is looked at, too.
         """
-        first, start_at = self._end(start, self.problem.start, "start")
-        last, goal_at = self._end(goal, self.problem.goal, "goal")
-        if np.array_equal(start_at, goal_at):
-            return self._path(start_at, goal_at, 0.0, [])
-        away = None if first.size else _connected(self._legs.away(start_at))
-        towards = None if last.size else _connected(self._legs.towards(goal_at))
-        origin = int(first[0]) if first.size else len(self.roadmap.position)
-        distance, before = self._search(origin, away)
-        ends = last if towards is None else towards.nodes
-        costs = distance[ends] + (0.0 if towards is None else towards.outcomes[:, 2])
-        nearest = int(np.argmin(costs)) if costs.size else 0
-        cost = float(costs[nearest]) if costs.size else math.inf
-        if away is not None or towards is not None:
-            direct = self.problem.evaluator.connect_pair(start_at, goal_at, self.problem.departure)
-            if direct.status == Status.CONNECTED and direct.cost < cost:
-                return self._path(start_at, goal_at, direct.cost, [(start_at, goal_at, direct)])
-        if not math.isfinite(cost):
-            return self._path(start_at, goal_at, math.inf, [])
-        end = int(ends[nearest])
-        hops: list[tuple[Array, Array, Edge]] = []
-        if towards is not None:
-            hops.append((self._where(end, start_at), goal_at, _edge(towards.outcomes[nearest])))
-        while end != origin:
-            earlier = int(before[end])
-            ends_at = self._where(earlier, start_at), self._where(end, start_at)
-            hops.append((*ends_at, self._edge(earlier, end, away)))
-            end = earlier
-        return self._path(start_at, goal_at, cost, hops[::-1])
+        return self.queries(start, [goal])[0]
+
+    def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
+        """The cheapest paths from a point (3,) [m] to each of many, as `query` finds them, by one search."""
+        search = self._search(self._start(start))
+        ends = [self._goal(goal) for goal in goals]
+        direct = self._direct(search.start, ends)
+        return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
+
+    def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
+        """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
+        ends = [self._goal(goal) for goal in goals]
+        costs = np.empty((len(starts), len(goals)))
+        for row, start in zip(costs, starts, strict=True):
+            search = self._search(self._start(start))
+            for m, (end, leg) in enumerate(zip(ends, self._direct(search.start, ends), strict=True)):
+                row[m] = 0.0 if np.array_equal(search.start.point, end.point) else _through(search, end)[0]
+                row[m] = min(row[m], leg.cost if leg.status == Status.CONNECTED else math.inf)
+        return costs
 
     @cached_property
     def _legs(self) -> Legs:
         return self.problem.legs(self.roadmap.position)
 
-    def _end(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
+    def _start(self, point: ArrayLike | None) -> _End:
+        nodes, place = self._place(point, self.problem.start, "start")
+        return _End(place, nodes, None if nodes.size else _connected(self._legs.away(place)))
+
+    def _goal(self, point: ArrayLike | None) -> _End:
+        nodes, place = self._place(point, self.problem.goal, "goal")
+        return _End(place, nodes, None if nodes.size else _connected(self._legs.towards(place)))
+
+    def _place(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
         """The nodes that lie at an end of the query, often none, and where it is."""
         if point is None:
             require(named is not None, f"the scenario names no {name}; give one with --{name} X,Y,Z")
@@ -92,27 +113,67 @@ class Planner:
         self.problem.check_point(place, name)
         return np.flatnonzero((self.roadmap.position == place).all(axis=1)), place
 
-    def _search(self, origin: int, away: Attached | None) -> tuple[Array, NDArray[np.int32]]:
-        """Cost from `origin` to every node, and each one's predecessor; an attached start is one more."""
+    @cached_property
+    def _graph(self) -> tuple[Array, NDArray[np.int32], NDArray[np.int32]]:
+        """Cost, target and first edge of each node, with room for the edges of one more, a start."""
         road, nodes = self.roadmap, len(self.roadmap.position)
-        cost, target, indptr = road.cost, road.target, road.indptr
-        if away is not None:
-            cost = np.concatenate([cost, away.outcomes[:, 2]])
-            target = np.concatenate([target, away.nodes.astype(np.int32)])
-            indptr = np.append(indptr, cost.size)
-        else:
-            indptr = np.append(indptr, indptr[-1])
-        graph = csr_array((cost, target, indptr), shape=(nodes + 1, nodes + 1))
+        cost = np.concatenate([road.cost, np.empty(nodes)])
+        target = np.concatenate([road.target, np.empty(nodes, np.int32)])
+        return cost, target, np.append(road.indptr, road.target.size).astype(np.int32)
+
+    def _search(self, start: _End) -> _Search:
+        """Dijkstra's algorithm from a start."""
+        (cost, target, indptr), nodes = self._graph, len(self.roadmap.position)
+        last = first = self.roadmap.target.size
+        if start.legs is not None:
+            last += start.legs.nodes.size
+            cost[first:last], target[first:last] = start.legs.outcomes[:, 2], start.legs.nodes
+        indptr[-1] = last
+        origin = int(start.nodes[0]) if start.nodes.size else nodes
+        graph = csr_array((cost[:last], target[:last], indptr), shape=(nodes + 1, nodes + 1))
         distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
-        return distance[0], before[0]
+        return _Search(start, origin, distance[0], before[0])
 
-    def _where(self, node: int, start: Array) -> Array:
-        return start if node == len(self.roadmap.position) else self.roadmap.position[node]
+    def _direct(self, start: _End, goals: Sequence[_End]) -> list[Edge]:
+        """The legs from end to end; between nodes the roadmap has said what there is."""
+        asked = [n for n, end in enumerate(goals) if start.legs is not None or end.legs is not None]
+        points = np.array([start.point, *(goals[n].point for n in asked)])
+        rows = [0], [0, len(asked)], np.arange(1, len(points))
+        found = self.problem.evaluator.connect(points, self.problem.departure, *rows)
+        legs = [NOTHING] * len(goals)
+        for n, row in zip(asked, found, strict=True):
+            legs[n] = _edge(row)
+        return legs
 
-    def _edge(self, source: int, target: int, away: Attached | None) -> Edge:
+    def _way(self, search: _Search, goal: _End, direct: Edge) -> Path:
+        """The path to a goal, by nodes or directly."""
+        start_at, goal_at = search.start.point, goal.point
+        if np.array_equal(start_at, goal_at):
+            return self._path(start_at, goal_at, 0.0, [])
+        cost, nearest = _through(search, goal)
+        if direct.status == Status.CONNECTED and direct.cost < cost:
+            return self._path(start_at, goal_at, direct.cost, [(start_at, goal_at, direct)])
+        if not math.isfinite(cost):
+            return self._path(start_at, goal_at, math.inf, [])
+        hops: list[tuple[Array, Array, Edge]] = []
+        end = int(goal.nodes[nearest] if goal.legs is None else goal.legs.nodes[nearest])
+        if goal.legs is not None:
+            hops.append((self._where(search, end), goal_at, _edge(goal.legs.outcomes[nearest])))
+        while end != search.origin:
+            earlier = int(search.before[end])
+            hops.append(
+                (self._where(search, earlier), self._where(search, end), self._edge(search, earlier, end))
+            )
+            end = earlier
+        return self._path(start_at, goal_at, cost, hops[::-1])
+
+    def _where(self, search: _Search, node: int) -> Array:
+        return search.start.point if node == len(self.roadmap.position) else self.roadmap.position[node]
+
+    def _edge(self, search: _Search, source: int, target: int) -> Edge:
         if source == len(self.roadmap.position):
-            assert away is not None
-            return _edge(away.outcomes[np.flatnonzero(away.nodes == target)[0]])
+            assert search.start.legs is not None
+            return _edge(search.start.legs.outcomes[np.flatnonzero(search.start.legs.nodes == target)[0]])
         row = slice(self.roadmap.indptr[source], self.roadmap.indptr[source + 1])
         n = int(self.roadmap.indptr[source] + np.flatnonzero(self.roadmap.target[row] == target)[0])
         return Edge(int(Status.CONNECTED), *(float(getattr(self.roadmap, name)[n]) for name in EDGE_FIELDS))
@@ -131,6 +192,15 @@ class Planner:
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
+
+
+def _through(search: _Search, goal: _End) -> tuple[float, int]:
+    """The least cost of a way to a goal by nodes, inf where there is none, and which of its nodes is last."""
+    costs = search.cost[goal.nodes]
+    if goal.legs is not None:
+        costs = search.cost[goal.legs.nodes] + goal.legs.outcomes[:, 2]
+    nearest = int(np.argmin(costs)) if costs.size else 0
+    return (float(costs[nearest]) if costs.size else math.inf), nearest
 
 
 def _connected(attached: Attached) -> Attached:

@@ -133,6 +133,22 @@ def test_trajectories_end_within_the_tolerance(router, start, goal):
         assert climbs == pytest.approx(leg.speed * np.sin(leg.glide_angle), rel=1e-6)
 
 
+def test_many_goals_from_one_search_and_a_table_are_the_single_queries(router, monkeypatch):
+    starts, goals = ([pair[n] for pair in PAIRS] for n in range(2))
+    single = [[router.query(start, goal) for goal in goals] for start in starts]
+    searches = []
+    search = Planner._search
+    monkeypatch.setattr(Planner, "_search", lambda self, start: searches.append(start) or search(self, start))
+    for start, paths in zip(starts, single, strict=True):
+        assert [path.as_dict() for path in router.queries(start, goals)] == [path.as_dict() for path in paths]
+    table = router.table(starts, goals)
+    assert len(searches) == 2 * len(starts)
+    assert table.tolist() == [[path.cost for path in paths] for paths in single]
+    assert planner.table(roadmap(), starts[:2], goals[:3]).tolist() == table[:2, :3].tolist()
+    assert planner.table(roadmap(), [], goals).shape == (0, len(goals))
+    assert planner.table(roadmap(), starts, []).shape == (len(starts), 0)
+
+
 def test_the_leg_from_end_to_end_is_looked_at(problem, router):
     start, goal = (-30.0, 20.0, -50.0), (-20.0, 55.0, -20.0)
     direct = problem.evaluator.connect_pair(start, goal)
