@@ -133,9 +133,11 @@ def main() -> None:
         place = context.command_path if context else "glider-stream"
         _refuse(f"{error.format_message().rstrip('.')}; see `{place} --help`")
     except OSError as error:
-        # what is written to files names them; only standard output has no name
-        place = error.filename or "standard output"
-        _refuse(f"{place} cannot be used: {(error.strerror or str(error)).lower()}; name another")
+        reason = (error.strerror or str(error)).lower()
+        if error.filename is None:
+            # what is written to files names them: this is standard output, and what waits there goes nowhere
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _refuse(f"{error.filename or 'standard output'} cannot be used: {reason}; name another")
     except MemoryError as error:
         _refuse(f"there is not enough memory ({error}); make the problem smaller")
     except (click.Abort, KeyboardInterrupt):

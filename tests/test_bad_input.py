@@ -574,7 +574,7 @@ def run_with(environment, *arguments, stdout=subprocess.PIPE):
         [executable(), *arguments],
         stdout=stdout,
         stderr=subprocess.PIPE,
-        env=os.environ | environment,
+        env={key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"} | environment,
         text=True,
         check=False,
     )
