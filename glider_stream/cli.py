@@ -121,6 +121,28 @@ def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> 
         click.echo(description)
 
 
+@cli.command()
+@click.option("--runs", type=int, default=5, show_default=True, help="How often each figure is measured.")
+@click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
+@click.option("--only", multiple=True, metavar="PART", help="integrator, methods, threads, sizes or starts.")
+@click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
+@click.option("--against", type=FILE, help="A record: say what has moved since.")
+@click.option("--json", "output", type=FILE, help="The record to write.")
+def bench(
+    runs: int, quick: bool, only: tuple[str, ...], ceiling: Path | None, against: Path | None, output: Path | None
+) -> None:
+    """Measure what this machine does; the full run takes a quarter of an hour and must be alone."""
+    from . import planner
+
+    record, moved = planner.bench(
+        output, against=against, runs=runs, quick=quick, only=only, ceiling=ceiling,
+        progress=lambda figure: click.echo(f"bench: {figure}", err=True),
+    )  # fmt: skip
+    click.echo(record)
+    if against is not None:
+        click.echo("\n".join(["moved beyond both spreads:", *(f"  {line}" for line in moved or ["nothing"])]))
+
+
 def main() -> None:
     """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
     try:

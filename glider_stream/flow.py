@@ -4,6 +4,7 @@ import hashlib
 import itertools
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from .kernels import flow as kernel
 from .settings import require
+from .threads import in_parallel
 
 Range = tuple[float, float]
 Array = NDArray[np.float64]
@@ -24,6 +26,8 @@ WIDEST = 1e9
 """Longest side of a box [m]."""
 FASTEST = 100.0
 """Greatest current [m/s] that is taken for one."""
+LINES_AT_ONCE = 8
+"""Lines of a sampled grid that a thread takes at once."""
 MAX_SAMPLES = 100_000_000
 """Largest grid [points] that `sampled` makes: 1.6 GB."""
 
@@ -290,11 +294,10 @@ def sample_flow(
     )
     counts = [max(2, math.ceil(n - 1e-9)) for n in points]
     lines = [np.linspace(lo, hi, n) for (lo, hi), n in zip(box, counts, strict=True)]
-    zz, xx, yy = (a.ravel() for a in np.meshgrid(lines[2], lines[0], lines[1], indexing="ij"))
-    values = kernel.velocities(flow, xx, yy, zz, np.zeros(zz.size))
-    values = values.reshape(counts[2], counts[0], counts[1], 2)
+    values = np.empty((counts[2], counts[0], counts[1], 2))
+    in_parallel(partial(kernel.sample_lines, flow, *lines, 0.0, values), counts[2] * counts[0], LINES_AT_ONCE)
     steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
-    level_speed = np.hypot(values[..., 0], values[..., 1]).max(axis=(1, 2))
+    level_speed = np.array([np.hypot(level[..., 0], level[..., 1]).max() for level in values])
     return kernel.Grid(
         values=values,
         level_speed=level_speed,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from os.path import realpath
 from pathlib import Path as File
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .store import build_file, check_output, read_roadmap
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .bench import Record
     from .describe import Description, Place
     from .ocean import Names
 
@@ -158,3 +159,21 @@ def describe(
     from .describe import describe
 
     return describe(currents, at, names)
+
+
+def bench(
+    output: str | File | None = None, *, against: str | File | None = None, **options: Any
+) -> tuple["Record", list[str]]:
+    """Measure what this machine does: the record, and what has moved since the record `against`.
+
+    `options` as `bench.bench` has them. Written as JSON where `output` says.
+    """
+    from .bench import bench, read_record, write_record
+
+    if output is not None:
+        check_output(output)
+    before = None if against is None else read_record(against)
+    record = bench(**options)
+    if output is not None:
+        write_record(record, output)
+    return record, [] if before is None else record.moved(before)

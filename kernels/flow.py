@@ -362,6 +362,15 @@ def mean_velocity(flow, x, y, z_from, z_to, t):
     return 0.5 * (u_from + u_to), 0.5 * (v_from + v_to)
 
 
+@entry_point(nogil=True)
+def sample_lines(flow, x, y, z, t, uv, first, last):
+    """`velocity` at time t on the mesh of x, y, z, into uv (z, x, y, 2), lines first..last - 1 along y."""
+    for n in range(first, last):
+        k, i = n // x.size, n % x.size
+        for j in range(y.size):
+            uv[k, i, j] = velocity(flow, x[i], y[j], z[k], t)
+
+
 @entry_point()
 def velocities(flow, x, y, z, t):
     """`velocity` at many points: x, y, z, t of shape (n,), result (n, 2) [m/s]; for callers from Python."""

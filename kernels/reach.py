@@ -20,8 +20,8 @@ MAX_TRIES = 12
 """Guesses that are polished for one node."""
 FAN_STEP = 3.0
 """Steps of a fan, in steps of a leg: it gives first guesses."""
-SPARE, LONGER = 1.3, 1.5
-"""A first deadline should suffice for SPARE times the limit; the next is LONGER times as long."""
+SPARE, LONGER = 1.3, 1.2
+"""A deadline should suffice for SPARE times the limit; each is at least LONGER times the one before."""
 LATEST = 1.1
 """A guess that arrives later, in deadlines, is not polished."""
 INSIDE = 1e-9
@@ -195,16 +195,24 @@ def nodes_swept(bins, polar, direction, x, y, z, outward, deadline):
 
 
 @kernel
-def first_deadline(bins, polar, direction, x, y, z, outward, limit, horizon):
-    """A time [s] in which a fan may pass over somewhat more than `limit` nodes, within the horizon [s]."""
+def time_to_sweep(bins, polar, direction, x, y, z, outward, nodes, horizon):
+    """The time [s] in which a fan may pass over so many nodes, within the horizon [s]."""
     early, late = 0.0, horizon
     for _ in range(8):
         middle = 0.5 * (early + late)
-        if nodes_swept(bins, polar, direction, x, y, z, outward, middle) < SPARE * limit:
+        if nodes_swept(bins, polar, direction, x, y, z, outward, middle) < nodes:
             early = middle
         else:
             late = middle
     return late
+
+
+@kernel
+def later_deadline(bins, polar, direction, x, y, z, outward, deadline, arrived, limit, horizon):
+    """A deadline [s] that should suffice for `limit` nodes, where `arrived` of them have met an earlier one."""
+    share = max(arrived, 1) / max(nodes_swept(bins, polar, direction, x, y, z, outward, deadline), 1.0)
+    enough = time_to_sweep(bins, polar, direction, x, y, z, outward, SPARE * limit / share, horizon)
+    return min(max(enough, LONGER * deadline), horizon)
 
 
 @entry_point(nogil=True)
@@ -232,8 +240,8 @@ def reach_points(
         elif limit > 0:
             outward = 1 - direction if backward else direction
             x, y, z = origin[n]
-            tasks[task, DEADLINE] = first_deadline(
-                bins, medium.polar, direction, x, y, z, outward, limit, horizon
+            tasks[task, DEADLINE] = time_to_sweep(
+                bins, medium.polar, direction, x, y, z, outward, SPARE * limit, horizon
             )
     guesses = np.empty((1024, GUESS_COLUMNS))
     while True:
@@ -271,7 +279,13 @@ def reach_points(
                     _keep(rows[begin:end], limit, counts, found, int(tasks[task, ORIGIN]))
                     tasks[task, DONE] = 1.0
                 else:
-                    tasks[task, DEADLINE] = min(LONGER * tasks[task, DEADLINE], horizon)
+                    n, direction = int(tasks[task, ORIGIN]), int(tasks[task, DIRECTION])
+                    outward = 1 - direction if backward else direction
+                    x, y, z = origin[n]
+                    tasks[task, DEADLINE] = later_deadline(
+                        bins, medium.polar, direction, x, y, z, outward, tasks[task, DEADLINE], arrived, limit,
+                        horizon,
+                    )  # fmt: skip
                     waiting = True
             begin = end
         if not waiting:

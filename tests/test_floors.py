@@ -21,7 +21,7 @@ FLOORS = {
     6: "roadmap path",
     7: "store query",
     8: "export plot progress describe verify jobs",
-    9: "scenario planner cli",
+    9: "scenario bench planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
 

@@ -1,0 +1,339 @@
+"""Benchmarks: what this machine does, each figure with its spread, so that two records can be compared."""
+
+import json
+import math
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError
+from .flow import sample_flow
+from .kernels.cache import KERNEL_DIGEST, entry_point
+from .kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
+from .kernels.motion import LANES, X, Y
+from .query import Planner
+from .roadmap import find_edges, node_positions
+from .scenario import read_scenario, scenario_from_text, to_toml
+from .settings import require
+from .store import read_roadmap, replacing
+from .threads import in_parallel, threads
+
+STEPS, FLIGHTS, AT_ONCE = 60, 16_384, 256
+"""RK4 steps of a flight of the raw integrator, flights in batches of LANES, batches a thread takes at once."""
+METHODS = {
+    "streamline 16, 27 nearest": (),
+    "surface 16, 27 nearest": ("steering.method=surface",),
+    "flow map, 27 nearest": ("steering.method=flow-map",),
+    "streamline 16, all": ("neighbours.kind=all",),
+    "surface 16, all": ("neighbours.kind=all", "steering.method=surface"),
+    "flow map, all": ("neighbours.kind=all", "steering.method=flow-map"),
+}
+SIZES = (1_000, 10_000, 100_000)
+LIMIT = 64
+PARTS = ("integrator", "methods", "threads", "sizes", "starts")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured quantity, as often as it was measured; whether `more` of it is better."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    more: bool = True
+
+    @property
+    def median(self) -> float:
+        """The middle value."""
+        return statistics.median(self.values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the record has it."""
+        spread = {"median": self.median, "low": min(self.values), "high": max(self.values)}
+        return (
+            {"name": self.name, "unit": self.unit, "more_is_better": self.more}
+            | spread
+            | {"runs": len(self.values)}
+        )
+
+    def __str__(self) -> str:
+        spread = f"{_said(min(self.values))} to {_said(max(self.values))}" if len(self.values) > 1 else "one run"
+        return f"{self.name:<44}{_said(self.median):>12} {self.unit:<16}({spread})"
+
+
+@dataclass(frozen=True)
+class Record:
+    """A run's figures, when and on what they were measured."""
+
+    figures: tuple[Figure, ...]
+    made: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The record for JSON; the raw integrator's rate, where measured, also under a name of its own."""
+        raw = {one.name: one.median for one in self.figures if one.name == "evaluations_per_s"}
+        return self.made | raw | {"figures": [one.as_dict() for one in self.figures]}
+
+    def __str__(self) -> str:
+        made = self.made
+        head = f"{made['date']}, {made['processor']}, {made['threads']} threads, Python {made['python']}"
+        return "\n".join([head, *(f"  {one}" for one in self.figures)])
+
+    def moved(self, before: dict[str, Any]) -> list[str]:
+        """What lies outside the spread of a record before, in words: both spreads, and which is better."""
+        then = {one["name"]: one for one in before["figures"]}
+        said = []
+        for now in self.figures:
+            old = then.get(now.name)
+            if old is None or (min(now.values) <= old["high"] and max(now.values) >= old["low"]):
+                continue
+            better = "better" if (now.median > old["median"]) == now.more else "worse"
+            ratio = now.median / old["median"]
+            said.append(f"{now.name}: {ratio:.2f} times {_said(old['median'])} {now.unit}, {better}")
+        return said
+
+
+def bench(
+    *,
+    runs: int = 5,
+    quick: bool = False,
+    only: Sequence[str] = (),
+    ceiling: str | Path | None = None,
+    progress: Callable[[Figure], None] = lambda figure: None,
+) -> Record:
+    """Measure the parts named in `only` (all if none), each figure `runs` times.
+
+    `quick` measures small problems, to see that all of it runs. `ceiling`: a program that prints its own
+    `evaluations_per_s` as JSON; the raw integrator is measured in turns with it.
+    """
+    require(runs >= 1, f"`runs` must be at least 1; got {runs}")
+    for name in only:
+        require(name in PARTS, f"the part {name!r} is not known; choose from: {', '.join(PARTS)}")
+    parts = {
+        "integrator": partial(integrator, runs, ceiling),
+        "methods": partial(methods, runs, quick),
+        "threads": partial(thread_scaling, runs, quick),
+        "sizes": partial(sizes, quick),
+        "starts": partial(starts, 1 if quick else runs, quick),
+    }
+    figures = []
+    with threads(None) as count:
+        for name, part in parts.items():
+            if name in only or not only:
+                for figure in part():
+                    progress(figure)
+                    figures.append(figure)
+    return Record(
+        tuple(figures),
+        {
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "processor": platform.processor() or platform.machine(),
+            "threads": count,
+            "python": platform.python_version(),
+            "numba": version("numba"),
+            "software_version": version("glider-stream"),
+            "kernel_digest": KERNEL_DIGEST,
+            "quick": quick,
+        },
+    )
+
+
+@entry_point(nogil=True)
+def _fly(flow, start, end, first, last):  # type: ignore[no-untyped-def]
+    lanes = hangar(FLIGHT_ROWS)
+    for e in range(first, last):
+        for n in range(LANES):
+            turn = 2.0 * math.pi * n / LANES
+            place(
+                lanes, n, start[e, 0], start[e, 1], -100.0, 0.0, 0.6 * math.cos(turn), 0.6 * math.sin(turn), -0.32
+            )
+            fly_for(lanes, n, 5.0 * STEPS, 5.0)
+        for _ in range(STEPS):
+            advance(flow, lanes)
+        end[e] = lanes[X].sum() + lanes[Y].sum()
+
+
+def integrator(runs: int, ceiling: str | Path | None) -> Iterator[Figure]:
+    """Currents interpolated per second inside RK4, through a grid as large as the ceiling's own."""
+    flow = read_scenario("seed-box").problem().evaluator.flow
+    box = (-600.0, 600.0)
+    grid = sample_flow(flow, (12.0, 12.0, 10.0), box, box, (-300.0, 0.0))
+    start, end = np.random.default_rng(0).uniform(-450, 450, (FLIGHTS, 2)), np.empty(FLIGHTS)
+    task = partial(_fly, grid, start, end)
+    in_parallel(task, 2, 1)
+    ours, theirs = [], []
+    for _ in range(runs):
+        ours.append(FLIGHTS * LANES * STEPS * 4 / _seconds(lambda: in_parallel(task, FLIGHTS, AT_ONCE)))
+        if ceiling is not None:
+            theirs.append(_ceiling(ceiling))
+    yield Figure("evaluations_per_s", "1/s", tuple(ours))
+    if theirs:
+        yield Figure("ceiling: evaluations per second", "1/s", tuple(theirs))
+        yield Figure("share of the ceiling", "", tuple(a / b for a, b in zip(ours, theirs, strict=True)))
+
+
+def _ceiling(program: str | Path) -> float:
+    try:
+        said = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
+        return float(json.loads(said)["evaluations_per_s"])
+    except (OSError, ValueError, KeyError, TypeError, subprocess.CalledProcessError) as error:
+        raise InputError(
+            f"the ceiling {program} must be a program that prints JSON with `evaluations_per_s`; got {error}"
+        ) from None
+
+
+def methods(runs: int, quick: bool) -> Iterator[Figure]:
+    """Pairs per second by method and law, on the seed box; compilation left out."""
+    for name, overrides in METHODS.items():
+        yield Figure(name, "pairs/s", tuple(_rate(overrides, quick, None) for _ in range(runs)))
+
+
+def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
+    """All threads over one, in turns."""
+    for name in ("streamline 16, all", "flow map, all"):
+        ratios = []
+        for _ in range(runs):
+            one, every = (_rate(METHODS[name], True if quick else None, count) for count in (1, None))
+            ratios.append(every / one)
+        yield Figure(f"all threads over one: {name}", "times", tuple(ratios))
+
+
+def _rate(overrides: Sequence[str], quick: bool | None, count: int | None) -> float:
+    """Pairs per second of a build of the seed box, of a quarter of its nodes where `quick` is None."""
+    shape = {True: "[5,5,3]", None: "[12,12,4]", False: "[16,16,4]"}[quick]
+    problem = read_scenario("seed-box", [*overrides, f"sampling.shape={shape}"]).problem()
+    tally = find_edges(problem, node_positions(problem), lambda edges: None, count)
+    return sum(tally.counts.values()) / tally.wall_s
+
+
+def growing(nodes: int) -> str:
+    """A scenario, as text, whose box grows with its nodes on four depths; vortices and nodes as dense as ever."""
+    side = math.ceil(math.sqrt(nodes / 4))
+    half = 28.125 * side
+    rng = np.random.default_rng(5)
+    count = max(4, round(nodes / 2000))
+    rows = zip(
+        *rng.uniform(-half, half, (2, count)).tolist(),
+        rng.uniform(250, 500, count).tolist(),
+        (rng.uniform(0.5, 1.2, count) * rng.choice([-1, 1], count)).tolist(),
+        rng.uniform(0, 300, count).tolist(),
+        rng.uniform(60, 150, count).tolist(),
+        strict=True,
+    )
+    names = ("x", "y", "radius", "speed", "depth", "thickness")
+    vortex = [dict(zip(names, row, strict=True)) for row in rows]
+    return to_toml(
+        {
+            "flow": {"kind": "vortices", "sampled": [30.0, 30.0, 15.0], "vortex": vortex},
+            "glider": {"preset": "paper"},
+            "domain": {"x": [-half, half], "y": [-half, half], "z": [-300.0, 0.0]},
+            "sampling": {"kind": "grid", "shape": [side, side, 4]},
+            "neighbours": {"kind": "reachable", "limit": LIMIT},
+            "steering": {"method": "flow-map"},
+            "integration": {"dt": 5.0, "steps": 125, "tolerance": 5.0},
+            "cost": {"kind": "time"},
+            "query": {"start": [-0.9 * half, 0.9 * half, 0.0], "goal": [0.9 * half, -0.9 * half, 0.0]},
+        }
+    )
+
+
+def sizes(quick: bool) -> Iterator[Figure]:
+    """Builds and queries of ever larger roadmaps, in processes of their own: time, memory, further queries."""
+    with tempfile.TemporaryDirectory() as folder:
+        for nodes in (100, 400) if quick else SIZES:
+            name, scenario, file = f"{nodes:,} nodes", Path(folder) / "growing.toml", Path(folder) / "growing.h5"
+            scenario.write_text(growing(nodes))
+            _, megabytes = _process("build", scenario, "-o", file)
+            road = read_roadmap(file)
+            yield Figure(
+                f"{name}: build, per edge", "microseconds", (1e6 * road.wall_s / road.target.size,), False
+            )
+            yield Figure(f"{name}: build, wall time", "s", (road.wall_s,), False)
+            yield Figure(f"{name}: edges", "", (float(road.target.size),))
+            yield Figure(f"{name}: most memory", "MB", (megabytes,), False)
+            yield Figure(f"{name}: first query, whole process", "s", (_process("query", file)[0],), False)
+            began = time.perf_counter()
+            problem = scenario_from_text(road.provenance.scenario).problem()
+            sampled = time.perf_counter() - began
+            yield Figure(f"{name}: of it, sampling the flow", "s", (sampled,), False)
+            planner, rng, half = Planner(road, problem), np.random.default_rng(1), 0.9 * problem.hi[0]
+            planner.query()
+            ends = rng.uniform([-half, -half, -290], [half, half, -10], (5, 2, 3))
+            times = tuple(_seconds(partial(planner.query, start, goal)) for start, goal in ends)
+            yield Figure(f"{name}: further query", "s", times, False)
+
+
+def starts(runs: int, quick: bool) -> Iterator[Figure]:
+    """Whole processes: what does nothing, what does something, with compiled kernels at hand and without."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "small.h5"
+        small = ["build", "seed-box", "-o", file, "--set", "sampling.shape=[4,4,3]"]
+        builds = {"streamline 16": small, "flow map": [*small, "--set", "steering.method=flow-map"]}
+        commands: dict[str, list[Any]] = {"--help": ["--help"], "build, streamline 16": small}
+        commands |= {"info": ["info", file], "query": ["query", file], "build, flow map": builds["flow map"]}
+        for name, command in commands.items():
+            _process(*command)
+            yield Figure(f"start: {name}", "s", tuple(_process(*command)[0] for _ in range(runs)), False)
+        for name, command in () if quick else builds.items():
+            cold = Path(folder) / name
+            seconds = _process(*command, environment={"NUMBA_CACHE_DIR": str(cold)})[0]
+            yield Figure(f"start without compiled kernels: build, {name}", "s", (seconds,), False)
+
+
+def _process(*arguments: Any, environment: dict[str, str] | None = None) -> tuple[float, float]:
+    """Wall time [s] and most memory [MB] of a command in a process of its own; a query may find no path."""
+    program = [sys.executable, "-c", "from glider_stream.cli import main; main()", *map(str, arguments)]
+    with tempfile.TemporaryFile() as said:
+        began = time.perf_counter()
+        process = subprocess.Popen(
+            program, env=os.environ | (environment or {}), stdout=subprocess.DEVNULL, stderr=said
+        )
+        _, status, used = os.wait4(process.pid, 0)
+        seconds = time.perf_counter() - began
+        process.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        require(
+            process.returncode in (0, 1), f"`{arguments[0]}` failed: {said.read().decode()[-300:]}; mend that"
+        )
+    return seconds, used.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def _seconds(task: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    task()
+    return time.perf_counter() - began
+
+
+def _said(value: float) -> str:
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
+def read_record(file: str | Path) -> dict[str, Any]:
+    """A record that `bench --json` wrote; InputError where it is not one."""
+    try:
+        record = json.loads(Path(file).read_text(encoding="utf-8"))
+        for one in record["figures"]:
+            sound = isinstance(one["name"], str) and one["low"] <= one["median"] <= one["high"]
+            require(sound and one["median"] != 0, "its figures make no sense")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        said = (error.strerror or "it is no file").lower() if isinstance(error, OSError) else str(error)
+        raise InputError(f"the record {file} cannot be read: {said}; write it with `bench --json`") from None
+    return dict(record)
+
+
+def write_record(record: Record, file: str | Path) -> None:
+    """Write a record as JSON."""
+    with replacing(Path(file)) as temporary:
+        temporary.write_text(json.dumps(record.as_dict(), indent=1) + "\n")
