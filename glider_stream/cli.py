@@ -131,7 +131,7 @@ def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> 
 def bench(
     runs: int, quick: bool, only: tuple[str, ...], ceiling: Path | None, against: Path | None, output: Path | None
 ) -> None:
-    """Measure what this machine does; the full run takes a quarter of an hour and must be alone."""
+    """Measure what this machine does; the full run takes some six minutes and must be alone."""
     from . import planner
 
     record, moved = planner.bench(

@@ -32,7 +32,7 @@ STEP, STRIDE, OPENS, CLOSES = _ROWS[11:15]
 MISS, DURATION, SLACK = _ROWS[15:]
 """Closest approach so far [m], and when [s]; what the control and the tolerance add to the flow's carry [m]."""
 BEFORE_X, BEFORE_Y, APPROACH_ROWS = _ROWS.stop, _ROWS.stop + 1, _ROWS.stop + 2
-LOOK_EVERY = 4
+LOOK_EVERY = 12
 """Steps between looks at a path that is not yet in its arrival window."""
 SOURCE, TARGET, NEXT, COUNT = range(4)
 """Where a batch of pairs stands: source, target, the next of its controls and how many there are."""

@@ -9,6 +9,8 @@ from .motion import X, Y
 
 LANDING_TOLERANCE = 0.005
 """A landing this close to its target [m] is a hit: half of what an edge may miss by."""
+FIRST_STEP = 2.0
+"""Steps of a guess's first flight, in steps of a leg: where it lands is corrected anyway."""
 MAX_ITERATIONS = 14
 GIVE_UP = 5
 """By this iteration a guess that leads anywhere has cut its miss to a quarter."""
@@ -38,7 +40,7 @@ def aim(polar, lanes, n, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, d
     lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n] = x_q, y_q, z_q
     lanes[DIRECTION, n], lanes[ANGLE, n], lanes[HEADING, n] = direction, angle, heading
     lanes[STATE, n], lanes[_ITERATION, n] = OPEN, 0.0
-    _take_off(polar, lanes, n, dt)
+    _take_off(polar, lanes, n, FIRST_STEP * dt)
 
 
 @kernel
@@ -63,7 +65,7 @@ def correct(polar, lanes, n, dt):
     miss = math.hypot(off_x, off_y)
     lanes[MISS, n] = miss
     iteration = lanes[_ITERATION, n]
-    if miss <= LANDING_TOLERANCE:
+    if miss <= LANDING_TOLERANCE and iteration > 0.0:
         lanes[HEADING, n] = math.atan2(math.sin(lanes[HEADING, n]), math.cos(lanes[HEADING, n]))
         lanes[STATE, n] = HIT
         rest(lanes, n)
@@ -79,7 +81,7 @@ def correct(polar, lanes, n, dt):
     low, high = polar.shallowest[direction], polar.steepest[direction]
     angle = min(max(lanes[ANGLE, n] + shorten * turn_a, low), high)
     lanes[_TURN_A, n], lanes[_TURN_H, n] = angle - lanes[ANGLE, n], shorten * turn_h
-    stuck = not (lanes[_TURN_A, n] != 0.0 or lanes[_TURN_H, n] != 0.0)
+    stuck = iteration > 0.0 and not (lanes[_TURN_A, n] != 0.0 or lanes[_TURN_H, n] != 0.0)
     astray = iteration == GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
     if stuck or astray or iteration == MAX_ITERATIONS - 1 or not miss < math.inf:
         lanes[STATE, n] = LOST
