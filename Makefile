@@ -23,7 +23,7 @@ test: install
 	$(RUN)/python -m pytest
 
 bench: install
-	$(RUN)/python benchmarks/literal_loop.py
+	$(RUN)/glider-stream bench --against benchmarks/records/bench.json
 
 clean:
 	rm -rf $(VENV) demo build *.egg-info

@@ -1,4 +1,4 @@
-"""Pairs per second beside the literal loop (every control, all steps), the same pairs in the same run.
+"""Pairs per second, by candidates and exact, beside the literal loop (every control, all steps): one run.
 
 python benchmarks/literal_loop.py [--law nearest|all] [--runs 5] [--share 4]
 """
@@ -7,11 +7,13 @@ import argparse
 import platform
 import statistics
 import time
+from dataclasses import replace
 
 import numba
 import numpy as np
 from numba import njit, prange
 
+from glider_stream.edges import FlowMapMethod
 from glider_stream.kernels.control import CLIMB, DIVE, candidate_controls, control_towards
 from glider_stream.kernels.motion import along_segment, rk4_step
 from glider_stream.neighbours import AllNodes, Nearest, as_csr
@@ -74,7 +76,9 @@ def main() -> None:
     literal_loop(*literal, position, source[:1], np.array([0, 1]), target[:1])
     evaluator.connect(position, 0.0, source[:1], [0, 1], target[:1])
     compiled = time.perf_counter() - began
-    slow, fast = [], []
+    exact = replace(evaluator, steering=FlowMapMethod())
+    exact.connect(position, 0.0, source[:1], [0, 1], target[:1])
+    slow, fast, fan = [], [], []
     for _ in range(options.runs):
         began = time.perf_counter()
         best = literal_loop(*literal, position, source, indptr, target)
@@ -82,14 +86,18 @@ def main() -> None:
         edges = evaluator.connect(position, 0.0, source, indptr, target)
         slow.append(half - began)
         fast.append(time.perf_counter() - half)
+        began = time.perf_counter()
+        exact.connect(position, 0.0, source, indptr, target)
+        fan.append(time.perf_counter() - began)
     same = np.array_equal(np.isfinite(best), edges[:, 0] == 0)
     same &= bool(np.nanmax(np.abs(best - edges[:, 1])[edges[:, 0] == 0], initial=0.0) < 1e-9)
-    ratios = [a / b for a, b in zip(slow, fast, strict=True)]
     print(f"seed-box, {options.law}, {evaluator.steering.candidates} controls, {target.size:,} pairs,")
     print(f"{platform.processor() or platform.machine()}, {numba.get_num_threads()} threads")
     print(f"literal loop {target.size / statistics.median(slow):>10,.0f} pairs/s")
-    print(f"evaluator    {target.size / statistics.median(fast):>10,.0f} pairs/s, the same edges: {same}")
-    print(f"ratio        {statistics.median(ratios):>10.2f} (from {min(ratios):.2f} to {max(ratios):.2f})")
+    for name, times, what in (("evaluator", fast, f", the same edges: {same}"), ("flow map", fan, "")):
+        ratios = [a / b for a, b in zip(slow, times, strict=True)]
+        spread = f"{statistics.median(ratios):.2f} times ({min(ratios):.2f} to {max(ratios):.2f})"
+        print(f"{name:<12} {target.size / statistics.median(times):>10,.0f} pairs/s, {spread}{what}")
     print(f"first calls, compilation or its cache included: {compiled:.1f} s")
 
 
