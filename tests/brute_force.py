@@ -13,35 +13,20 @@ from glider_stream.kernels.motion import rk4_step
 
 @njit
 def land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
-    """Where and when a control, left at t [s], lands at a depth: x, y [m], duration [s]."""
+    """Where and when a control, left at t [s], lands at a depth: x, y [m], duration [s]; if the flow is known."""
     speed = glide_speed(polar, direction, angle)
     u = speed * math.cos(angle) * math.cos(heading)
     v = speed * math.cos(angle) * math.sin(heading)
     w = (2.0 * direction - 1.0) * speed * math.sin(angle)
     duration = (z_q - z) / w
+    known = True
     n = 0
     while n * dt < duration:
+        known &= contains(flow, x, y, t + n * dt)
         step = min(dt, duration - n * dt)
         x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, step)
         n += 1
-    return x, y, duration
-
-
-@njit
-def stays(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
-    """Whether every step of a control's path to a depth begins where the flow is known."""
-    speed = glide_speed(polar, direction, angle)
-    u = speed * math.cos(angle) * math.cos(heading)
-    v = speed * math.cos(angle) * math.sin(heading)
-    w = (2.0 * direction - 1.0) * speed * math.sin(angle)
-    duration = (z_q - z) / w
-    n = 0
-    while n * dt < duration:
-        if not contains(flow, x, y, t + n * dt):
-            return False
-        x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, min(dt, duration - n * dt))
-        n += 1
-    return True
+    return x, y, duration, known
 
 
 @njit
@@ -49,15 +34,14 @@ def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt
     """Travel time of the solution that damped Newton steps lead to [s]; inf where they do not close in."""
     low, high = polar.shallowest[direction], polar.steepest[direction]
     for _ in range(30):
-        x_0, y_0, duration = land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt)
+        x_0, y_0, duration, known = land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt)
         off_x, off_y = x_0 - x_q, y_0 - y_q
         miss = math.hypot(off_x, off_y)
         if miss < 0.002:
-            known = stays(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt)
             return duration if known and duration <= horizon else math.inf
         e = 1e-5 if angle + 1e-5 < high else -1e-5
-        x_a, y_a, _ = land(flow, polar, direction, x, y, z, z_q, t, angle + e, heading, dt)
-        x_h, y_h, _ = land(flow, polar, direction, x, y, z, z_q, t, angle, heading + 1e-5, dt)
+        x_a, y_a, _, _ = land(flow, polar, direction, x, y, z, z_q, t, angle + e, heading, dt)
+        x_h, y_h, _, _ = land(flow, polar, direction, x, y, z, z_q, t, angle, heading + 1e-5, dt)
         a, c, b, d = (x_a - x_0) / e, (y_a - y_0) / e, (x_h - x_0) / 1e-5, (y_h - y_0) / 1e-5
         det = a * d - b * c
         if det == 0.0:
@@ -67,7 +51,7 @@ def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt
         for _ in range(8):
             next_angle = min(max(angle + share * turn_a, low), high)
             next_heading = heading + share * turn_h
-            x_n, y_n, _ = land(flow, polar, direction, x, y, z, z_q, t, next_angle, next_heading, dt)
+            x_n, y_n, _, _ = land(flow, polar, direction, x, y, z, z_q, t, next_angle, next_heading, dt)
             if math.hypot(x_n - x_q, y_n - y_q) < miss:
                 break
             share *= 0.5
