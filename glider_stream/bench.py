@@ -196,23 +196,24 @@ def _ceiling(program: str | Path) -> float:
 
 def methods(runs: int, quick: bool) -> Iterator[Figure]:
     """Pairs per second by method and law, on the seed box; compilation left out."""
+    shape = "[5,5,3]" if quick else "[16,16,4]"
     for name, overrides in METHODS.items():
-        yield Figure(name, "pairs/s", tuple(_rate(overrides, quick, None) for _ in range(runs)))
+        yield Figure(name, "pairs/s", tuple(_rate(overrides, shape) for _ in range(runs)))
 
 
 def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
     """All threads over one, in turns."""
+    shape = "[5,5,3]" if quick else "[12,12,4]"
     for name in ("streamline 16, all", "flow map, all"):
         ratios = []
         for _ in range(runs):
-            one, every = (_rate(METHODS[name], True if quick else None, count) for count in (1, None))
-            ratios.append(every / one)
+            one = _rate(METHODS[name], shape, 1)
+            ratios.append(_rate(METHODS[name], shape) / one)
         yield Figure(f"all threads over one: {name}", "times", tuple(ratios))
 
 
-def _rate(overrides: Sequence[str], quick: bool | None, count: int | None) -> float:
-    """Pairs per second of a build of the seed box, of a quarter of its nodes where `quick` is None."""
-    shape = {True: "[5,5,3]", None: "[12,12,4]", False: "[16,16,4]"}[quick]
+def _rate(overrides: Sequence[str], shape: str, count: int | None = None) -> float:
+    """Pairs per second of a build of the seed box with so many nodes, on `count` threads, all if None."""
     problem = read_scenario("seed-box", [*overrides, f"sampling.shape={shape}"]).problem()
     tally = find_edges(problem, node_positions(problem), lambda edges: None, count)
     return sum(tally.counts.values()) / tally.wall_s
