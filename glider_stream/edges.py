@@ -228,10 +228,8 @@ class Evaluator:
                 break
             room = int(counts.max())
         rows = found[np.arange(room) < counts[:, None]]
-        source = np.repeat(np.arange(len(points)), counts)
-        order = np.lexsort((rows[:, 0], source))
         first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        return first, rows[order, 0].astype(np.int64), np.ascontiguousarray(rows[order, 1:])
+        return first, rows[:, 0].astype(np.int64), rows[:, 1:]
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
         """The outcome of one pair of points (3,) [m]."""

@@ -32,15 +32,15 @@ def in_parallel(kernel: Callable[[int, int], object], count: int, at_once: int) 
 
     The kernel writes to rows of its own items alone, so that neither the threads nor `at_once` change a bit.
     """
-    workers = min(_COUNT.get() or int(_CONFIG.NUMBA_NUM_THREADS), -(-count // at_once))
+    spans = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
+    workers = min(_COUNT.get() or int(_CONFIG.NUMBA_NUM_THREADS), len(spans))
     if workers <= 1:
-        if count > 0:
-            kernel(0, count)
+        for span in spans:
+            kernel(*span)
         return
     pool = ThreadPoolExecutor(workers)
     try:
-        firsts = range(0, count, at_once)
-        for _ in pool.map(lambda first: kernel(first, min(first + at_once, count)), firsts):
+        for _ in pool.map(lambda span: kernel(*span), spans):
             pass
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

@@ -10,7 +10,7 @@ from .control import CLIMB, angle_of_vertical_speed, control_towards, horizontal
 from .cost import edge_cost
 from .edges import BLOCKED, CLEARANCE_SPACING, CONNECTED, NO_HIT, Edge, no_edge, quick_status, store
 from .fan import FAN_ROWS, fan_guesses
-from .flight import LEFT, advance, hangar, stayed_inside, widen
+from .flight import LEFT, advance, hangar, rest, stayed_inside, widen
 from .flow import contains
 from .motion import LANES, is_clear, stays_inside
 from .patch import ANGLE, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, bin_range
@@ -18,12 +18,14 @@ from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct
 
 MAX_TRIES = 12
 """Guesses that are polished for one node."""
-FAN_STEP = 3.0
+FAN_STEP = 8.0
 """Steps of a fan, in steps of a leg: it gives first guesses."""
 SPARE, LONGER = 1.3, 1.2
 """A deadline should suffice for SPARE times the limit; each is at least LONGER times the one before."""
 LATEST = 1.1
 """A guess that arrives later, in deadlines, is not polished."""
+SURE = 2.0
+"""A flight is given up when it would be late even if its next step changed its time by SURE times its last one."""
 INSIDE = 1e-9
 """A guess this little outside its triangle is inside."""
 ORIGIN, DIRECTION, DEADLINE, DONE = range(4)
@@ -86,14 +88,11 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
             groups += 1
     begin[groups] = count
     result = np.empty((groups, ROW))
-    shortest = np.empty(groups)
     for g in range(groups):
         first = guesses[order[begin[g]]]
         result[g, 0], result[g, 1] = first[TASK], first[NODE]
         store(result[g, 2:], no_edge(NO_HIT))
-        shortest[g] = -time[order[begin[g]]]
-    # long flights first: at the end, when lanes run out of work, the rest is short
-    queue = ranks(shortest)
+    # in the order of the nodes: lanes side by side fly through the same water
     following = begin[:groups].copy()
     group = np.zeros(LANES, np.int64)
     taken = 0
@@ -101,8 +100,8 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
     lanes[LEFT] = math.inf
     for n in range(LANES):
         if taken < groups:
-            group[n] = queue[taken]
-            _take(medium, position, origin, departure, backward, tasks, guesses[order[begin[group[n]]]], lanes, n)
+            group[n] = taken
+            _take(medium, position, origin, departure, backward, tasks, guesses[order[begin[taken]]], lanes, n)
             taken += 1
             flying += 1
     while flying > 0:
@@ -111,13 +110,15 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
         for n in range(LANES):
             if lanes[LEFT, n] > 0.0:
                 continue
+            before = lanes[TIME, n]
             correct(medium.polar, lanes, n, medium.integration.dt)
-            if lanes[STATE, n] == OPEN:
-                continue
             g = group[n]
             row = result[g, 2:]
             known = row[0] == CONNECTED
-            arrives = lanes[STATE, n] == HIT and lanes[TIME, n] <= tasks[int(result[g, 0]), DEADLINE]
+            deadline = tasks[int(result[g, 0]), DEADLINE]
+            if lanes[STATE, n] == OPEN and lanes[TIME, n] - SURE * abs(lanes[TIME, n] - before) <= deadline:
+                continue
+            arrives = lanes[STATE, n] == HIT and lanes[TIME, n] <= deadline
             if arrives and not (known and edge_cost(lanes[TIME, n]) >= row[2]):
                 edge = checked_leg(medium, lanes, n)
                 if edge.status == CONNECTED or (edge.status == BLOCKED and not known):
@@ -130,9 +131,10 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
                 more = guesses[guess, OUTSIDE] <= INSIDE and edge_cost(time[guess]) < row[2]
             if not more:
                 if taken == groups:
+                    rest(lanes, n)
                     flying -= 1
                     continue
-                g = queue[taken]
+                g = taken
                 group[n] = g
                 taken += 1
             _take(medium, position, origin, departure, backward, tasks, guesses[order[following[g]]], lanes, n)
@@ -225,7 +227,7 @@ def reach_points(
     To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with `backward` from
     them. With a `limit`, a fan is cut at a deadline, which is put off until that many of its legs arrive before
     it; the fastest so many are kept of each direction. Into rows of `found` (n, capacity, node and fields of
-    Edge); a count above the capacity says how much is needed.
+    Edge), by rising node; a count above the capacity says how much is needed.
     """
     horizon = medium.integration.dt * medium.integration.steps
     lanes = hangar(max(STEER_ROWS, FAN_ROWS))
@@ -289,7 +291,10 @@ def reach_points(
                     waiting = True
             begin = end
         if not waiting:
-            return
+            break
+    for n in range(first, last):
+        legs = found[n, : min(counts[n], found.shape[1])]
+        legs[:] = legs[ranks(legs[:, 0].copy())]
 
 
 @making

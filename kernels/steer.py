@@ -7,9 +7,9 @@ from .control import glide_speed
 from .flight import FLIGHT_ROWS, fly_for, place, rest
 from .motion import X, Y
 
-LANDING_TOLERANCE = 0.005
-"""A landing this close to its target [m] is a hit: half of what an edge may miss by."""
-FIRST_STEP = 2.0
+LANDING_TOLERANCE = 0.009
+"""A landing this close to its target [m] is a hit: a little less than what an edge may miss by."""
+FIRST_STEP = 3.0
 """Steps of a guess's first flight, in steps of a leg: where it lands is corrected anyway."""
 MAX_ITERATIONS = 14
 GIVE_UP = 5
@@ -81,7 +81,8 @@ def correct(polar, lanes, n, dt):
     low, high = polar.shallowest[direction], polar.steepest[direction]
     angle = min(max(lanes[ANGLE, n] + shorten * turn_a, low), high)
     lanes[_TURN_A, n], lanes[_TURN_H, n] = angle - lanes[ANGLE, n], shorten * turn_h
-    stuck = iteration > 0.0 and not (lanes[_TURN_A, n] != 0.0 or lanes[_TURN_H, n] != 0.0)
+    # a second step beyond the glide polar's end, or none at all
+    stuck = iteration > 0.0 and lanes[_TURN_A, n] == 0.0 and (turn_a != 0.0 or turn_h == 0.0)
     astray = iteration == GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
     if stuck or astray or iteration == MAX_ITERATIONS - 1 or not miss < math.inf:
         lanes[STATE, n] = LOST
