@@ -125,7 +125,7 @@ def bench(
         "integrator": partial(integrator, runs, ceiling),
         "methods": partial(methods, runs, quick),
         "threads": partial(thread_scaling, runs, quick),
-        "sizes": partial(sizes, quick),
+        "sizes": partial(sizes, 1 if quick else runs, quick),
         "starts": partial(starts, 1 if quick else runs, quick),
     }
     figures = []
@@ -224,7 +224,7 @@ def growing(nodes: int) -> str:
     side = math.ceil(math.sqrt(nodes / 4))
     half = 28.125 * side
     rng = np.random.default_rng(5)
-    count = max(4, round(nodes / 2000))
+    count = max(1, round(nodes / 2000))
     rows = zip(
         *rng.uniform(-half, half, (2, count)).tolist(),
         rng.uniform(250, 500, count).tolist(),
@@ -250,20 +250,22 @@ def growing(nodes: int) -> str:
     )
 
 
-def sizes(quick: bool) -> Iterator[Figure]:
+def sizes(runs: int, quick: bool) -> Iterator[Figure]:
     """Builds and queries of ever larger roadmaps, in processes of their own: time, memory, further queries."""
     with tempfile.TemporaryDirectory() as folder:
         for nodes in (100, 400) if quick else SIZES:
             name, scenario, file = f"{nodes:,} nodes", Path(folder) / "growing.toml", Path(folder) / "growing.h5"
             scenario.write_text(growing(nodes))
-            _, megabytes = _process("build", scenario, "-o", file)
-            road = read_roadmap(file)
-            yield Figure(
-                f"{name}: build, per edge", "microseconds", (1e6 * road.wall_s / road.target.size,), False
-            )
-            yield Figure(f"{name}: build, wall time", "s", (road.wall_s,), False)
+            walls, megabytes = [], []
+            for _ in range(runs):
+                megabytes.append(_process("build", scenario, "-o", file)[1])
+                road = read_roadmap(file)
+                walls.append(road.wall_s)
+            per_edge = tuple(1e6 * wall / road.target.size for wall in walls)
+            yield Figure(f"{name}: build, per edge", "microseconds", per_edge, False)
+            yield Figure(f"{name}: build, wall time", "s", tuple(walls), False)
+            yield Figure(f"{name}: most memory", "MB", tuple(megabytes), False)
             yield Figure(f"{name}: edges", "", (float(road.target.size),))
-            yield Figure(f"{name}: most memory", "MB", (megabytes,), False)
             first = tuple(_process("query", file)[0] for _ in range(5))
             yield Figure(f"{name}: first query, whole process", "s", first, False)
             began = time.perf_counter()

@@ -217,6 +217,15 @@ def later_deadline(bins, polar, direction, x, y, z, outward, deadline, arrived, 
     return min(max(enough, LONGER * deadline), horizon)
 
 
+@kernel
+def end_of(rows, task, begin):
+    """Where the rows of a task end that begin at `begin`."""
+    end = begin
+    while end < rows.shape[0] and rows[end, 0] == task:
+        end += 1
+    return end
+
+
 @entry_point(nogil=True)
 def reach_points(
     medium, steering, bins, position, origin, departure, backward, indptr, target, limit, counts, found, first,
@@ -246,11 +255,14 @@ def reach_points(
                 bins, medium.polar, direction, x, y, z, outward, SPARE * limit, horizon
             )
     guesses = np.empty((1024, GUESS_COLUMNS))
+    settled = np.empty((0, ROW))
     while True:
         count = np.int64(0)  # not a literal: what takes it is compiled once
+        begin = 0
         for task in range(tasks.shape[0]):
             if tasks[task, DONE]:
                 continue
+            end = end_of(settled, task, begin)
             n, direction = int(tasks[task, ORIGIN]), int(tasks[task, DIRECTION])
             x, y, z = origin[n]
             lowest, highest = -math.inf, math.inf
@@ -259,6 +271,8 @@ def reach_points(
                 for k in range(indptr[n], indptr[n + 1]):
                     wanted[target[k]] = True
                     lowest, highest = min(lowest, position[target[k], 2]), max(highest, position[target[k], 2])
+            for k in range(begin, end):
+                wanted[int(settled[k, 1])] = False
             deepest = highest if (direction == CLIMB) != backward else lowest
             guesses, count = fan_guesses(
                 medium, steering, bins, position, wanted, task, direction, backward, x, y, z, departure[n],
@@ -267,16 +281,19 @@ def reach_points(
             if indptr.size > 0:
                 for k in range(indptr[n], indptr[n + 1]):
                     wanted[target[k]] = False
-        rows = polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes)
+            for k in range(begin, end):
+                wanted[int(settled[k, 1])] = True
+            begin = end
+        rows = np.concatenate(
+            (settled, polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes))
+        )
+        rows = rows[ranks(rows[:, 0].copy())]
+        is_settled = np.zeros(rows.shape[0], np.bool_)
         begin = 0
-        waiting = False
         for task in range(tasks.shape[0]):
-            end = begin
-            arrived = 0
-            while end < rows.shape[0] and rows[end, 0] == task:
-                arrived += rows[end, 2] == CONNECTED
-                end += 1
+            end = end_of(rows, task, begin)
             if not tasks[task, DONE]:
+                arrived = np.count_nonzero(rows[begin:end, 2] == CONNECTED)
                 if arrived >= limit or tasks[task, DEADLINE] >= horizon:
                     _keep(rows[begin:end], limit, counts, found, int(tasks[task, ORIGIN]))
                     tasks[task, DONE] = 1.0
@@ -288,10 +305,13 @@ def reach_points(
                         bins, medium.polar, direction, x, y, z, outward, tasks[task, DEADLINE], arrived, limit,
                         horizon,
                     )  # fmt: skip
-                    waiting = True
+                    is_settled[begin:end] = rows[begin:end, 2] == CONNECTED
             begin = end
-        if not waiting:
+        if np.all(tasks[:, DONE] == 1.0):
             break
+        settled = rows[is_settled]
+        if indptr.size == 0:
+            wanted = np.ones(position.shape[0], np.bool_)
     for n in range(first, last):
         legs = found[n, : min(counts[n], found.shape[1])]
         legs[:] = legs[ranks(legs[:, 0].copy())]
