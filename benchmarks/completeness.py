@@ -20,16 +20,14 @@ from typing import Any
 
 import numba
 import numpy as np
-from scipy.integrate import solve_ivp
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
-import brute_force
 from completeness_fields import BEYOND, fields
 
+from glider_stream import brute_force
 from glider_stream.edges import Evaluator
 from glider_stream.kernels.edges import Status
-from glider_stream.kernels.flow import Grid, velocities
+from glider_stream.kernels.flow import Grid
 from glider_stream.neighbours import AllNodes, Nearest, as_csr
+from glider_stream.verify import replayed_misses
 
 SCAN = (48, 96)
 LATE = 1.0
@@ -37,9 +35,7 @@ LATE = 1.0
 BOUNDS = {"near": 0.99, "all": 0.98, "in_time_near": 0.99, "in_time_all": 0.99, "reachable": 0.995}
 MOST_OFF = {True: 0.5, False: 0.1}
 """Distance [m] from the target that a replayed leg may end at, on a grid and elsewhere."""
-AT_ONCE = 10
-"""Legs that DOP853 flies together: its step is the one that the most crooked of them needs."""
-CONNECTED, TIME, ANGLE, HEADING, SPEED, MISS = 0, 1, 3, 4, 5, 6
+CONNECTED, TIME, MISS = 0, 1, 6
 Case = tuple[Any, float, Evaluator]
 
 
@@ -59,23 +55,7 @@ def brute(case: Case, source: Any, targets: Any, threads: int) -> Any:
 def end_distances(case: Case, source: Any, target: Any, rows: Any) -> Any:
     """How far from their targets [m] legs end, flown by DOP853 in the full flow: (n,)."""
     position, departure, judge = case
-
-    def rate(share: float, at: Any, z: Any, u: Any, v: Any, w: Any, duration: Any) -> Any:
-        along = share * duration
-        flow_u, flow_v = velocities(judge.flow, *at.reshape(2, -1), z + along * w, departure + along).T
-        return np.concatenate([(flow_u + u) * duration, (flow_v + v) * duration])
-
-    tight = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-7, "max_step": 0.02}
-    off = np.empty(len(rows))
-    for first in range(0, len(rows), AT_ONCE):
-        some = slice(first, first + AT_ONCE)
-        (x, y, z), goal, row = position[source[some]].T, position[target[some]].T, rows[some].T
-        along, w, duration = row[SPEED] * np.cos(row[ANGLE]), row[SPEED] * np.sin(row[ANGLE]), row[TIME]
-        through = along * np.cos(row[HEADING]), along * np.sin(row[HEADING]), w
-        path = solve_ivp(rate, (0, 1), np.concatenate([x, y]), args=(z, *through, duration), **tight)
-        end = *path.y[:, -1].reshape(2, -1), z + duration * w
-        off[some] = np.linalg.norm(np.array(end) - goal, axis=0)
-    return off
+    return replayed_misses(judge, departure, position, source, target, rows[:, TIME:])
 
 
 def connect(case: Case, source: Any, targets: Any) -> tuple[Any, Any, Any]:

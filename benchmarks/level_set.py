@@ -12,8 +12,10 @@ project's legs, edges or steering: only the flow as the planner reads it, the po
   to get out of there, m the greatest current within tau, Vh the greatest horizontal speed, and t from then on:
   t + tau / (1 + m / Vh) is a bound below. One run gives every tau; large ones bound loosely, and within four
   cells or so the front is smeared and late.
-- Either end. The front may as well begin at the goal, in the opposite flow. The runs that count begin at the
-  end with the smaller m; all grids but the finest are run from the other end too, as a check.
+- Either end. In a steady flow the front may as well begin at the goal, in the opposite flow. The runs that
+  count begin at the end with the smaller m; all grids but the finest are run from the other end too, as a check.
+- A flow that changes with time is read anew at the middle of every STEP; the front then begins at the start
+  alone, and there is no path from above.
 - Surface and floor. The field goes on beyond both as its mirror image. A path there, folded back, dives where
   it climbed, which a polar alike in both allows (else the script refuses): the mirror is exact. It lets gliders
   slide along the surface and hold a depth at the best horizontal speed, as dives and climbs of no length do.
@@ -84,9 +86,8 @@ class Waters:
     def __init__(self, problem: Problem) -> None:
         flow, polar = problem.evaluator.flow, problem.evaluator.polar
         require(problem.start is not None, "the scenario has no [query]: it names the start and the goal")
-        require(is_steady(flow), "the flow changes with time; this script takes steady flows")
         require(bool(np.allclose(*polar.speed)), "the glider dives and climbs by different polars")
-        self.flow, self.departure = flow, problem.departure
+        self.flow, self.departure, self.steady = flow, problem.departure, is_steady(flow)
         self.ends = np.array(problem.start, float), np.array(problem.goal, float)
         self.lo = np.array([flow.x_lo, flow.y_lo, problem.lo[2]])
         self.hi = np.array([flow.x_hi, flow.y_hi, problem.hi[2]])
@@ -102,10 +103,10 @@ class Waters:
         self.support = np.array([((1 - a) * level + a * sink).max() for a in self.share])
         self.sink, self.level = np.r_[0.0, sink[best:]], np.r_[level[best], level[best:]]
 
-    def current(self, at: np.ndarray) -> np.ndarray:
-        """Current (u, v) [m/s] at points (..., 3)."""
+    def current(self, at: np.ndarray, since: float = 0.0) -> np.ndarray:
+        """Current (u, v) [m/s] at points (..., 3), `since` [s] after departure."""
         x, y, z = np.ascontiguousarray(at.reshape(-1, 3).T, dtype=np.float64)
-        uv = velocities(self.flow, x, y, z, np.full(x.size, self.departure))
+        uv = velocities(self.flow, x, y, z, np.full(x.size, self.departure + since))
         return np.asarray(uv).reshape(*at.shape[:-1], 2)
 
     def still_water_time(self, away: np.ndarray) -> np.ndarray:
@@ -174,8 +175,13 @@ class Front:
         grid = hj.Grid.from_lattice_parameters_and_boundary_conditions(box, shape, sides)
         self.axes = [np.linspace(a, b, n) for a, b, n in zip(waters.lo, waters.hi, shape, strict=True)]
         nodes = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
-        uv = jnp.asarray(waters.current(nodes) * (-1 if backwards else 1), grid.states.dtype)
-        grid = grid.replace(states=jnp.concatenate([grid.states, uv], axis=-1))
+        places, sign = grid.states, -1 if backwards else 1
+
+        def in_current(since: float) -> Any:
+            uv = jnp.asarray(sign * waters.current(nodes, since), places.dtype)
+            return grid.replace(states=jnp.concatenate([places, uv], axis=-1))
+
+        moving = in_current(0.0)
         tau = waters.still_water_time(nodes - self.source)
         values = jnp.asarray(np.hypot(tau, SOFT) - SOFT, grid.states.dtype)
         settings = hj.SolverSettings.with_accuracy(
@@ -185,7 +191,9 @@ class Front:
         self.frames, self.touch = [np.asarray(values)] if keep else [], dict.fromkeys(TAUS, math.nan)
         # the path needs frames until the front has arrived
         while left > (5 if keep else min(TAUS)) and now < latest:
-            values = hj.step(settings, dynamics, grid, now, values, now + STEP, progress_bar=False)
+            if not waters.steady:
+                moving = in_current(now + STEP / 2)
+            values = hj.step(settings, dynamics, moving, now, values, now + STEP, progress_bar=False)
             now, before, left = now + STEP, left, self._tau(np.asarray(values))
             for one in TAUS:
                 if left <= one < before:
@@ -278,13 +286,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Every grid, coarse to fine; the path from above; what they say together."""
     waters = Waters(read_scenario(args.scenario, args.set).problem())
     slower = [waters.quickening(end, TAU) for end in waters.ends]
-    backwards = slower[1] < slower[0]
+    backwards = waters.steady and slower[1] < slower[0]
     shapes = [tuple(int(n) for n in text.split(",")) for text in args.grid or GRIDS]
     runs: list[dict[str, Any]] = []
     above: dict[str, float] = {}
     for shape in shapes:
-        for way in (backwards, not backwards)[: 1 if shape is shapes[-1] else 2]:
-            front = Front(waters, shape, way, args.latest, keep=not runs)
+        for way in (backwards, not backwards)[: 1 if shape is shapes[-1] or not waters.steady else 2]:
+            front = Front(waters, shape, way, args.latest, keep=waters.steady and not runs)
             runs.append({
                 "grid": list(shape),
                 "spacing_m": [round(float(axis[1] - axis[0]), 3) for axis in front.axes],
@@ -309,13 +317,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def conclude(runs: list[dict[str, Any]], above: dict[str, float]) -> dict[str, Any]:
     """The finest grid's bound [s], the estimate of its error, and the one less the other."""
-    at = [one["bound_s"][str(TAU)] for one in runs]
-    if len(runs) < 3:
+    finest, at = runs[-1], [one["bound_s"][str(TAU)] for one in runs]
+    coarser = [one for one in runs if one["grid"] != finest["grid"]]
+    if not coarser:
         return {"finest_s": at[-1], "error_s": None, "bound_s": None}
-    ends = [one["touch_plus_tau_s"][str(TAU)] for one in runs[-3:-1]]
+    next_grid = [one for one in coarser if one["grid"] == coarser[-1]["grid"]]
+    same_way = next(one for one in next_grid if one["from"] == finest["from"])
     differences = {
-        "next_grid": abs(at[-1] - at[-3]),
-        "ends": abs(ends[0] - ends[1]),
+        "next_grid": abs(at[-1] - same_way["bound_s"][str(TAU)]),
+        "ends": float(np.ptp([one["touch_plus_tau_s"][str(TAU)] for one in next_grid])),
         "tau": float(np.ptp(list(runs[-1]["touch_plus_tau_s"].values()))),
         "above_the_path": max(0.0, at[-1] - above.get("travel_time_s", math.inf)),
     }
@@ -332,7 +342,7 @@ def conclude(runs: list[dict[str, Any]], above: dict[str, float]) -> dict[str, A
 def main() -> None:
     """Read the arguments, run, print and keep."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenario", help="a scenario with a steady flow and a [query]")
+    parser.add_argument("scenario", help="a scenario with a [query]")
     parser.add_argument("--grid", action="append", metavar="NX,NY,NZ", help="again for more, coarse to fine")
     parser.add_argument("--latest", type=float, default=7200.0, help="give up at this time [s]")
     parser.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE")

@@ -89,6 +89,23 @@ def info(roadmap: Path, as_json: bool) -> None:
 
 @cli.command()
 @ROADMAP
+@click.option("--sample", type=int, default=200, show_default=True, help="Edges for DOP853; 0 for all.")
+@JSON
+def verify(roadmap: Path, sample: int, as_json: bool) -> None:
+    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if it is not what it says."""
+    from . import planner
+
+    verification = planner.verify(roadmap, sample)
+    if as_json:
+        _write_json(verification.as_dict())
+    else:
+        click.echo(verification)
+    if not verification.holds:
+        sys.exit(1)
+
+
+@cli.command()
+@ROADMAP
 @click.argument("path", required=False, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF.")
 @click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
@@ -122,20 +139,45 @@ def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> 
 
 
 @cli.command()
-@click.option("--runs", type=int, default=5, show_default=True, help="How often each figure is measured.")
+@click.option("--runs", type=int, help="How often each figure is measured; 5 if not given.")
 @click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
-@click.option("--only", multiple=True, metavar="PART", help="integrator, methods, threads, sizes or starts.")
+@click.option("--only", multiple=True, metavar="PART", help="Parts, or problems of the suite; see README.")
+@click.option("--suite", is_flag=True, help="Solve the named problems instead, by every method and baseline.")
+@click.option("--ompl", type=FILE, help="With --suite: a folder for logs that OMPL's tools read.")
 @click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
 @click.option("--against", type=FILE, help="A record: say what has moved since.")
 @click.option("--json", "output", type=FILE, help="The record to write.")
 def bench(
-    runs: int, quick: bool, only: tuple[str, ...], ceiling: Path | None, against: Path | None, output: Path | None
+    runs: int | None,
+    quick: bool,
+    only: tuple[str, ...],
+    suite: bool,
+    ompl: Path | None,
+    ceiling: Path | None,
+    against: Path | None,
+    output: Path | None,
 ) -> None:
-    """Measure what this machine does; the full run takes some six minutes and must be alone."""
+    """Measure what this machine does, or how good routes are; the full run must be alone on it."""
     from . import planner
 
+    if suite:
+        alien = {"--runs": runs, "--ceiling": ceiling, "--against": against}
+        for name, value in alien.items():
+            if value is not None:
+                raise click.UsageError(f"{name} does not go with --suite; leave one of them out")
+        report = planner.suite(
+            output,
+            ompl=ompl,
+            quick=quick,
+            only=only,
+            progress=lambda said: click.echo(f"suite: {said}", err=True),
+        )
+        click.echo(report)
+        return
+    if ompl is not None:
+        raise click.UsageError("--ompl goes with --suite alone; add that or leave it out")
     record, moved = planner.bench(
-        output, against=against, runs=runs, quick=quick, only=only, ceiling=ceiling,
+        output, against=against, runs=5 if runs is None else runs, quick=quick, only=only, ceiling=ceiling,
         progress=lambda figure: click.echo(f"bench: {figure}", err=True),
     )  # fmt: skip
     click.echo(record)

@@ -149,28 +149,23 @@ class Evaluator:
             result = np.empty((targets.size, 7))
             refines = isinstance(self.steering, StreamlineMethod) and self.steering.refine
             kernel = refine.refine_nodes if refines else connect.connect_nodes
-            task = partial(kernel, self._medium, self.steering.kernel(), *pairs, result)
+            task = partial(kernel, self.medium, self.steering.kernel(), *pairs, result)
             in_parallel(task, sources.size, NODES_AT_ONCE)
         return result
 
     def _connect_by_fan(self, nodes: Array, departs: Array, sources: Index, rows: Index, targets: Index) -> Array:
-        quick = reach.quick_statuses(self._medium, nodes, departs, sources, rows, targets)
-        result = np.full((targets.size, 7), np.nan)
-        result[:, 0] = quick
-        may = quick == Status.NO_HIT
+        result = np.empty((targets.size, 7))
+        quick = partial(reach.quick_statuses, self.medium, nodes, departs, sources, rows, targets, result)
+        in_parallel(quick, sources.size, NODES_AT_ONCE)
+        may = result[:, 0] == Status.NO_HIT
         wanted = np.concatenate([[0], np.cumsum(may)])[rows].astype(np.int64), targets[may]
-        indptr, node, found = self._reach(nodes, nodes[sources], departs[sources], False, *wanted, 0)
-        # a source's row of targets may be in any order, and name one twice
-        have = np.repeat(np.arange(sources.size), np.diff(indptr)) * len(nodes) + node
-        ask = np.repeat(np.arange(sources.size), np.diff(rows)) * len(nodes) + targets
-        at = np.searchsorted(have, ask)
-        hit = may & (at < have.size)
-        hit[hit] = have[at[hit]] == ask[hit]
-        result[hit] = found[at[hit]]
+        legs = self._reach(nodes, nodes[sources], departs[sources], False, *wanted, 0)
+        in_parallel(partial(reach.answer, rows, targets, *legs, result), sources.size, NODES_AT_ONCE)
         return result
 
     @property
-    def _medium(self) -> edges.Medium:
+    def medium(self) -> edges.Medium:
+        """As the kernels read it."""
         return edges.Medium(self.flow, self.terrain, self.polar, self.integration.kernel())
 
     @property
@@ -214,7 +209,7 @@ class Evaluator:
         if len(position) == 0:
             return np.zeros(len(origin) + 1, np.int64), np.empty(0, np.int64), np.empty((0, 7))
         nodes, points = (np.require(a, np.float64, ["C", "W"]) for a in (position, origin))
-        how = self._medium, self.steering.kernel(), node_bins(nodes)
+        how = self.medium, self.steering.kernel(), node_bins(nodes)
         ends = nodes, points, departs, backward, indptr, target, limit
         room = 2 * limit if limit else min(len(nodes), MOST_LEGS)
         if indptr.size > 0:
@@ -229,7 +224,7 @@ class Evaluator:
             room = int(counts.max())
         rows = found[np.arange(room) < counts[:, None]]
         first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        return first, rows[:, 0].astype(np.int64), rows[:, 1:]
+        return first, rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
         """The outcome of one pair of points (3,) [m]."""
@@ -264,7 +259,7 @@ class Evaluator:
     def control_line(self, start: ArrayLike, goal: ArrayLike, candidates: int, departure: float = 0.0) -> Array:
         """The pair's controls on its control line: magnitude of the glide angle and heading (n, 2) [rad]."""
         ends = [float(value) for value in (*np.ravel(start), *np.ravel(goal))]
-        where: Array = connect.line_controls(self._medium, control.Streamline(candidates), *ends, departure)
+        where: Array = connect.line_controls(self.medium, control.Streamline(candidates), *ends, departure)
         return where
 
     def allowed(self, points: Array, t: float = 0.0) -> NDArray[np.bool_]:

@@ -1,31 +1,201 @@
-"""Route files: a path in the forms that other programs read."""
+"""Route files: a path in the forms that other programs read.
 
+Coordinates are longitude, latitude and altitude (a depth is negative), bearings clockwise from true north.
+"""
+
+import csv
+import io
 import json
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path as File
+from typing import Any
+from xml.etree import ElementTree as Xml
 
-from .path import Path
+from .path import Leg, Path
+from .seaglider import targets
 from .settings import require
+from .slocum import NAME, mission_files
 from .store import check_output, replacing
+from .waypoints import wrapped_lon
+
+Texts = dict[str, str]
 
 
-def _json(path: Path) -> str:
-    return json.dumps(path.as_dict(), indent=1) + "\n"
+def _json(path: Path, name: str) -> Texts:
+    return {name: json.dumps(path.as_dict(), indent=1) + "\n"}
 
 
-EXPORTS: dict[str, Callable[[Path], str]] = {".json": _json}
+def _place(lonlat: Any, z: float) -> list[float]:
+    lon, lat = lonlat
+    return [round(wrapped_lon(float(lon)), 7), round(float(lat), 7), round(float(z), 2) + 0.0]
+
+
+def _track(path: Path) -> list[list[float]]:
+    """The route's places, every leg's curve."""
+    places = [_place(path.lonlat[0], path.start[2])] if path.lonlat is not None else []
+    for leg in path.legs:
+        assert leg.track is not None
+        places += [_place(lonlat, row[3]) for lonlat, row in zip(leg.track[1:], leg.trajectory[1:], strict=True)]
+    return places
+
+
+def _when(path: Path, seconds: float) -> str | None:
+    """The time of day, ISO 8601 in UTC, where the plan knows when it begins."""
+    if path.departs is None:
+        return None
+    return (path.departs + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _rows(path: Path) -> Iterator[dict[str, Any]]:
+    """A row for each leg: where and when it ends, how it is flown, what the water does to it."""
+    for n, leg in enumerate(path.legs, 1):
+        u, v = _mean_current(leg)
+        depths = -leg.trajectory[:, 3]
+        over_ground = math.hypot(*(leg.trajectory[-1, 1:3] - leg.trajectory[0, 1:3])) / max(leg.duration, 1e-9)
+        if leg.lonlat is None:
+            place = {"x": round(float(leg.end[0]), 2), "y": round(float(leg.end[1]), 2)}
+        else:
+            lon, lat, _ = _place(leg.lonlat[1], 0.0)
+            place = {"lat": lat, "lon": lon}
+        arrives = leg.depart + leg.duration
+        yield {
+            "name": f"WP{n:03}",
+            **place,
+            "eta": _when(path, arrives) or round(arrives, 1),
+            "depth_min": round(float(depths.min()), 2) + 0.0,
+            "depth_max": round(float(depths.max()), 2),
+            "heading": round(leg.compass, 2),
+            "glide_angle": round(math.degrees(leg.glide_angle), 2),
+            "speed_over_ground": round(over_ground, 4),
+            "current_u": round(u, 4),
+            "current_v": round(v, 4),
+        }
+
+
+def _mean_current(leg: Leg) -> tuple[float, float]:
+    """What carried the leg beside its own speed, on the average: east and north [m/s]."""
+    along = leg.speed * math.cos(leg.glide_angle)
+    x, y = (leg.trajectory[-1, 1:3] - leg.trajectory[0, 1:3]) / max(leg.duration, 1e-9)
+    u, v = x - along * math.cos(leg.heading), y - along * math.sin(leg.heading)
+    c, s = math.cos(leg.north), math.sin(leg.north)
+    return float(u * c + v * s), float(v * c - u * s)
+
+
+def _csv(path: Path, name: str) -> Texts:
+    rows, text = list(_rows(path)), io.StringIO(newline="")
+    table = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return {name: text.getvalue()}
+
+
+def _geojson(path: Path, name: str) -> Texts:
+    line = {"type": "LineString", "coordinates": _track(path)}
+    features = [{"type": "Feature", "geometry": line, "properties": {"travel_time_s": path.travel_time}}]
+    for row, leg in zip(_rows(path), path.legs, strict=True):
+        assert leg.lonlat is not None
+        point = {"type": "Point", "coordinates": _place(leg.lonlat[1], leg.end[2])}
+        features.append({"type": "Feature", "geometry": point, "properties": row})
+    return {name: json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"}
+
+
+def _child(parent: Xml.Element, tag: str, text: str | None = None, **attributes: str) -> Xml.Element:
+    one = Xml.SubElement(parent, tag, attributes)
+    one.text = text
+    return one
+
+
+def _xml(root: Xml.Element, name: str) -> Texts:
+    Xml.indent(root)
+    return {name: '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"}
+
+
+def _kml(path: Path, name: str) -> Texts:
+    root = Xml.Element("kml", xmlns="http://www.opengis.net/kml/2.2")
+    document = _child(root, "Document")
+    _child(document, "name", "glider-stream route")
+    route = _child(document, "Placemark")
+    _child(route, "name", "route")
+    line = _child(route, "LineString")
+    _child(line, "altitudeMode", "absolute")
+    _child(line, "coordinates", " ".join(",".join(map(str, place)) for place in _track(path)))
+    for row, leg in zip(_rows(path), path.legs, strict=True):
+        mark = _child(document, "Placemark")
+        _child(mark, "name", row["name"])
+        said = f"heading {row['heading']} degrees, glide angle {row['glide_angle']} degrees, eta {row['eta']}"
+        _child(mark, "description", said)
+        if path.departs is not None:
+            _child(_child(mark, "TimeStamp"), "when", row["eta"])
+        point = _child(mark, "Point")
+        _child(point, "altitudeMode", "absolute")
+        assert leg.lonlat is not None
+        _child(point, "coordinates", ",".join(map(str, _place(leg.lonlat[1], leg.end[2]))))
+    return _xml(root, name)
+
+
+def _gpx(path: Path, name: str) -> Texts:
+    root = Xml.Element("gpx", version="1.1", creator="glider-stream", xmlns="http://www.topografix.com/GPX/1/1")
+    route = _child(root, "rte")
+    for row, leg in zip(_rows(path), path.legs, strict=True):
+        assert leg.lonlat is not None
+        lon, lat, z = _place(leg.lonlat[1], leg.end[2])
+        point = _child(route, "rtept", lat=str(lat), lon=str(lon))
+        _child(point, "ele", str(z))
+        if path.departs is not None:
+            _child(point, "time", row["eta"])
+        _child(point, "name", row["name"])
+    segment = _child(_child(root, "trk"), "trkseg")
+    for lon, lat, z in _track(path):
+        _child(_child(segment, "trkpt", lat=str(lat), lon=str(lon)), "ele", str(z))
+    return _xml(root, name)
+
+
+EXPORTS: dict[str, Callable[[Path, str], Texts]] = {
+    ".json": _json,
+    ".geojson": _geojson,
+    ".kml": _kml,
+    ".gpx": _gpx,
+    ".csv": _csv,
+    ".ma": mission_files,
+    "targets": targets,
+}
+"""By a file's ending, or its name: what writes it; a form may need more than one file."""
+ANYWHERE = (".json", ".csv")
+"""The forms that need no longitude and latitude."""
+
+
+def _form(file: str | File) -> str:
+    place = File(file)
+    return place.name if place.name in EXPORTS else place.suffix.lower()
 
 
 def check_export(file: str | File) -> None:
     """InputError unless the file's ending names a known form, and the file can be made."""
-    suffix = File(file).suffix.lower()
-    known, got = ", ".join(EXPORTS), repr(suffix or "no ending")
-    require(suffix in EXPORTS, f"the route file {file} must end in one of: {known}; got {got}")
+    form, known = _form(file), ", ".join(EXPORTS)
+    got = repr(form or "no ending")
+    require(form in EXPORTS, f"the route file {file} must end in one of: {known}; got {got}")
+    slocum = form != ".ma" or NAME.fullmatch(File(file).name) is not None
+    require(slocum, f"a Slocum goto list must be called goto_lNN.ma, NN two digits; got {File(file).name}")
     check_output(file)
 
 
-def export_path(path: Path, file: str | File) -> None:
-    """Write a path in the form that the file's ending names."""
+def export_path(path: Path, file: str | File) -> list[File]:
+    """Write a path in the form that the file's ending names; returns the files that it took.
+
+    Where there is no path only JSON says so; no file of another form is written.
+    """
     check_export(file)
-    with replacing(File(file)) as temporary:
-        temporary.write_text(EXPORTS[File(file).suffix.lower()](path), encoding="utf-8")
+    form, place = _form(file), File(file)
+    geographic = path.lonlat is not None or form in ANYWHERE
+    require(geographic, f"the route file {file} needs longitude and latitude; plan in a geographic scenario")
+    if not path.legs and form != ".json":
+        return []
+    texts = EXPORTS[form](path, place.name)
+    for name in texts:
+        check_output(place.with_name(name))
+    for name, text in texts.items():
+        with replacing(place.with_name(name)) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return [place.with_name(name) for name in texts]

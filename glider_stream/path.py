@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path as File
 from typing import Any
 
@@ -22,7 +23,8 @@ class Leg:
     """One glide, with one trim: from `start` to `end` (3,) [m]; the nodes it was planned between.
 
     `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
-    `lonlat` (2, 2) [degrees] of start and end, where the scenario is geographic.
+    Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
+    trajectory, and `north` [rad], true north counter-clockwise from the frame's +y.
     """
 
     start: Array
@@ -35,6 +37,13 @@ class Leg:
     miss: float
     trajectory: Array
     lonlat: Array | None = None
+    track: Array | None = None
+    north: float = 0.0
+
+    @property
+    def compass(self) -> float:
+        """The heading as a bearing, clockwise from true north [degrees]."""
+        return math.degrees(math.pi / 2 + self.north - self.heading) % 360
 
     def as_dict(self) -> dict[str, Any]:
         """As the path file has it."""
@@ -52,13 +61,12 @@ class Leg:
 
     def __str__(self) -> str:
         way, glide = "climb" if self.glide_angle > 0 else "dive ", math.degrees(self.glide_angle)
-        compass = math.degrees(math.pi / 2 - self.heading) % 360
         # a geographic scenario speaks of depths, any other of heights
         begin, end = (z if self.lonlat is None else 0.0 - z for z in (self.start[2], self.end[2]))
         there = "" if self.lonlat is None else "  at {:.4f}, {:.4f}".format(*self.lonlat[1])
         return (
             f"{self.depart:9,.0f} s  {way} {begin:7.0f} m to {end:6.0f} m{there}  "
-            f"glide {glide:6.1f} deg  compass {compass:5.1f} deg  "
+            f"glide {glide:6.1f} deg  compass {self.compass:5.1f} deg  "
             f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
         )
 
@@ -67,7 +75,8 @@ class Leg:
 class Path:
     """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
 
-    From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic.
+    From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
+    `departs` (UTC) where it says when.
     """
 
     start: Array
@@ -75,6 +84,7 @@ class Path:
     cost: float
     legs: tuple[Leg, ...]
     lonlat: Array | None = None
+    departs: datetime | None = None
 
     @property
     def found(self) -> bool:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from .bench import Record
     from .describe import Description, Place
     from .ocean import Names
+    from .suite import Report
+    from .verify import Verification
 
 
 def build(
@@ -73,6 +75,13 @@ def query(
     for output in outputs:
         export_path(path, output)
     return path
+
+
+def verify(roadmap: str | File, sample: int = 200) -> "Verification":
+    """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too."""
+    from .verify import verify
+
+    return verify(roadmap, lambda text: scenario_from_text(text).problem(), sample)
 
 
 def table(roadmap: str | File | Roadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
@@ -177,3 +186,23 @@ def bench(
     if output is not None:
         write_record(record, output)
     return record, [] if before is None else record.moved(before)
+
+
+def suite(output: str | File | None = None, *, ompl: str | File | None = None, **options: Any) -> "Report":
+    """Solve the suite's named problems by every method and baseline; `options` as `suite.run_suite` has them.
+
+    Written as JSON where `output` says; a log per problem, as OMPL's tools read them, into the folder `ompl`.
+    """
+    from .suite import ompl_log, run_suite, write_report
+
+    if output is not None:
+        check_output(output)
+    if ompl is not None:
+        require(File(ompl).is_dir(), f"the folder {ompl} for logs is none; make it first")
+    report = run_suite(**options)
+    if output is not None:
+        write_report(report, output)
+    if ompl is not None:
+        for name in report.references:
+            (File(ompl) / f"{name}.log").write_text(ompl_log(report, name))
+    return report

@@ -184,14 +184,22 @@ class Planner:
             rows = self.problem.evaluator.trace(source, edge, self.problem.departure)
             rows[:, 0] += clock - self.problem.departure
             control = edge.glide_angle, edge.heading, edge.speed
-            ends = self._lonlat(source, target)
-            legs.append(Leg(source, target, *control, clock, edge.time, edge.miss, rows, ends))
+            where = self._lonlat(source, target), self._lonlat(*rows[:, 1:]), self._north(source)
+            legs.append(Leg(source, target, *control, clock, edge.time, edge.miss, rows, *where))
             clock += edge.time
-        return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal))
+        return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs)
 
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
+
+    def _north(self, point: Array) -> float:
+        """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
+        ends = self._lonlat(point, point + np.array([0.0, 1.0, 0.0]))
+        if ends is None:
+            return 0.0
+        east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
+        return math.atan2(east, north)
 
 
 def _through(search: _Search, goal: _End) -> tuple[float, int]:

@@ -33,7 +33,8 @@ class Problem:
     """A scenario made into objects: what `build` and `query` need.
 
     `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
-    x, y [m] into degrees where the scenario is geographic. `summary` says what it is, in words.
+    x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
+    where known. `flow_words`, `glider_words` say what they are.
     """
 
     evaluator: Evaluator
@@ -48,6 +49,7 @@ class Problem:
     flow_words: str
     glider_words: str
     to_lonlat: Callable[[Array], Array] | None = None
+    departs: datetime | None = None
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""

@@ -4,7 +4,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from datetime import date
+from datetime import UTC, date, datetime, timedelta
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -99,12 +99,21 @@ class Scenario:
             flow_words=words,
             glider_words=str(self.glider),
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
+            departs=self._departs(),
         )
 
     @property
     def departure(self) -> float:
         """When gliders leave their nodes [s]."""
         return 0.0 if self.query is None else self.query.departure
+
+    def _departs(self) -> datetime | None:
+        """When gliders leave, by the calendar, where the flow says when t = 0 is."""
+        if not isinstance(self.flow, OceanFlow) or self.flow.epoch is None:
+            return None
+        epoch = datetime.fromisoformat(self.flow.epoch.strip())
+        utc = epoch.replace(tzinfo=UTC) if epoch.tzinfo is None else epoch.astimezone(UTC)
+        return utc + timedelta(seconds=self.departure)
 
     def _waters(self, glide: float, horizon: float) -> tuple[Flow, Terrain, str]:
         """Flow and terrain; `glide` [m] is how far a glider gets in still water within the horizon [s]."""

@@ -25,7 +25,7 @@ SPARE, LONGER = 1.3, 1.2
 LATEST = 1.1
 """A guess that arrives later, in deadlines, is not polished."""
 SURE = 2.0
-"""A flight is given up when it would be late even if its next step changed its time by SURE times its last one."""
+"""A flight is given up that is late even if its next step changes its time SURE times as much as the last."""
 INSIDE = 1e-9
 """A guess this little outside its triangle is inside."""
 ORIGIN, DIRECTION, DEADLINE, DONE = range(4)
@@ -329,16 +329,25 @@ def _keep(rows, limit, counts, found, n):
         counts[n] += 1
 
 
-@entry_point()
-def quick_statuses(medium, position, departure, source, indptr, target):
-    """`quick_status` of all pairs, taken as in `connect_nodes`; NO_HIT where nothing forbids a leg: (pairs,)."""
-    statuses = np.empty(target.size)
-    for n in range(source.size):
+@entry_point(nogil=True)
+def quick_statuses(medium, position, departure, source, indptr, target, outcomes, first, last):
+    """`quick_status` of all pairs of source[first:last], NO_HIT where nothing forbids a leg: outcomes[:, 0]."""
+    for n in range(first, last):
         x_p, y_p, z_p = position[source[n]]
         for k in range(indptr[n], indptr[n + 1]):
             x_q, y_q, z_q = position[target[k]]
             direction = 1 if z_q > z_p else 0
             t = departure[source[n]]
             status = quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t)
-            statuses[k] = NO_HIT if status == CONNECTED else status
-    return statuses
+            store(outcomes[k], no_edge(NO_HIT if status == CONNECTED else status))
+
+
+@entry_point(nogil=True)
+def answer(indptr, target, found_indptr, found_target, found, outcomes, first, last):
+    """The legs that were found, rising by target within a row, as outcomes of the pairs that asked for them."""
+    for n in range(first, last):
+        have = found_target[found_indptr[n] : found_indptr[n + 1]]
+        for k in range(indptr[n], indptr[n + 1]):
+            at = np.searchsorted(have, target[k])
+            if outcomes[k, 0] == NO_HIT and at < have.size and have[at] == target[k]:
+                outcomes[k] = found[found_indptr[n] + at]

@@ -1,12 +1,11 @@
 from itertools import pairwise
 
-import brute_force
 import numpy as np
 import pytest
 import reference
 from small import scenario_file
 
-from glider_stream import planner
+from glider_stream import brute_force, planner
 from glider_stream.edges import FlowMapMethod, StreamlineMethod
 from glider_stream.flow import sample_flow
 from glider_stream.kernels.edges import Edge

@@ -16,12 +16,12 @@ FLOORS = {
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine"
     " errors settings threads",
-    4: "bins glider flow domain frame ocean ocean_flow terrain",
+    4: "bins glider flow domain frame ocean ocean_flow terrain brute_force",
     5: "sampling neighbours edges legs",
-    6: "roadmap path",
+    6: "roadmap path waypoints",
     7: "store query",
-    8: "export plot progress describe verify jobs",
-    9: "scenario bench planner cli",
+    8: "slocum seaglider export plot progress describe verify jobs baselines",
+    9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
 

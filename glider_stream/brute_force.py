@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
-from glider_stream.kernels.cache import entry_point
-from glider_stream.kernels.control import glide_speed
-from glider_stream.kernels.flow import contains
-from glider_stream.kernels.motion import rk4_step
+from .kernels.cache import entry_point
+from .kernels.control import glide_speed
+from .kernels.flow import contains
+from .kernels.motion import rk4_step
 
 
 @njit

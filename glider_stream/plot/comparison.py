@@ -1,0 +1,62 @@
+"""Comparisons: a quantity by method, with confidence intervals, against controls or time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from .canvas import GREY, INK, frozen, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LOOKS = (("#0072b2", "o", "-"), ("#d55e00", "s", "--"), ("#009e73", "^", "-."), (INK, "D", ":"))
+"""Colour, marker and line of each series: told apart in grey and by the colour-blind (Okabe and Ito 2008)."""
+
+
+class Mean(NamedTuple):
+    """A mean at `x`, None where it holds for every x, with the ends of its interval and a note."""
+
+    x: float | None
+    mean: float
+    low: float
+    high: float
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Series:
+    """One method's means."""
+
+    name: str
+    points: Sequence[Mean]
+
+
+def plot_comparison(
+    series: Sequence[Series], title: str, labels: tuple[str, str], scales: tuple[str, str] = ("linear", "linear")
+) -> "Figure":
+    """Draw means and intervals of up to four series over a common axis; `labels` with units."""
+    with styled():
+        figure = new_figure(6.2, 4.2, title)
+        axes = figure.add_subplot()
+        axes.set(xlabel=labels[0], ylabel=labels[1], xscale=scales[0], yscale=scales[1])
+        for one, (colour, marker, line) in zip(series, LOOKS, strict=False):
+            points = [point for point in one.points if point.x is not None]
+            for level in (point for point in one.points if point.x is None):
+                name = f"{one.name} ({level.note})" if level.note else one.name
+                axes.axhline(level.mean, color=colour, linestyle=line, label=name)
+                axes.axhspan(level.low, level.high, color=colour, alpha=0.15, linewidth=0)
+            if not points:
+                continue
+            below, above = [p.mean - p.low for p in points], [p.high - p.mean for p in points]
+            axes.errorbar(
+                [p.x or 0.0 for p in points], [p.mean for p in points], yerr=[below, above], label=one.name,
+                color=colour, marker=marker, linestyle=line, markersize=4.5, capsize=2.5, linewidth=1.2,
+            )  # fmt: skip
+            for p in points:
+                axes.annotate(
+                    p.note, (p.x or 0.0, p.high), xytext=(0, 3), textcoords="offset points", ha="center",
+                    fontsize=6.5, color=colour,
+                )  # fmt: skip
+        axes.grid(color=GREY, alpha=0.3, linewidth=0.5)
+        axes.legend(frameon=False)
+        return frozen(figure)

@@ -1,0 +1,304 @@
+"""The suite: problems with references, and what methods and baselines make of them and of random queries."""
+
+import json
+import math
+import platform
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .baselines import BASELINES
+from .brute_force import fastest_legs
+from .edges import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
+from .kernels.cache import KERNEL_DIGEST
+from .kernels.edges import Status
+from .neighbours import Reachable
+from .query import Planner
+from .roadmap import Problem, build_roadmap
+from .sampling import SobolSampler
+from .scenario import read_scenario
+from .settings import require
+from .store import replacing
+from .threads import threads
+
+Array = NDArray[np.float64]
+METHODS: dict[str, Method] = {
+    "flow-map": FlowMapMethod(),
+    "streamline": StreamlineMethod(16),
+    "surface": SurfaceMethod(16),
+}
+BEST = "best known"
+DENSE, DENSE_LIMIT = 4096, 128
+"""Nodes and limit of the roadmap whose routes are the best known of random queries."""
+SCAN = (48, 96)
+"""Controls that brute force begins with."""
+QUARTILES = (25, 50, 75, 95)
+ROW = "{:<17}{:<16}{:>10}{:>13}{:>9}{:>10}{:>11}"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A problem's least travel time [s], None where no path exists; its kind, and how it is known."""
+
+    seconds: float | None
+    kind: str
+    how: str
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One method's route between one pair of points: its travel time [s], inf where there is none."""
+
+    problem: str
+    method: str
+    pair: int
+    travel_time: float
+    wall_s: float
+    legs: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a method makes of a problem: its route [s], build [s], edges, pairs; None where it has none."""
+
+    problem: str
+    method: str
+    travel_time: float
+    build_s: float | None = None
+    edges: int | None = None
+    pairs: int | None = None
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a route."""
+        return math.isfinite(self.travel_time)
+
+
+@dataclass(frozen=True)
+class Report:
+    """A run of the suite: outcomes, attempts at random queries, completeness (share, of how many legs)."""
+
+    references: dict[str, Reference]
+    outcomes: tuple[Outcome, ...]
+    attempts: tuple[Attempt, ...]
+    completeness: dict[str, tuple[float, int]]
+    made: dict[str, Any]
+
+    def over_reference(self, outcome: Outcome) -> float | None:
+        """Travel time over the problem's reference, where both are known."""
+        seconds = self.references[outcome.problem].seconds
+        return outcome.travel_time / seconds if seconds and outcome.solved else None
+
+    def quality(self) -> list[dict[str, Any]]:
+        """Per problem and method, of random queries: success among those that any method solves, and the
+        quartiles and 95 % of the travel time over the best known."""
+        best = {(a.problem, a.pair): a.travel_time for a in self.attempts if a.method == BEST}
+        for one in self.attempts:
+            best[one.problem, one.pair] = min(best[one.problem, one.pair], one.travel_time)
+        rows = []
+        for problem, method in dict.fromkeys((a.problem, a.method) for a in self.attempts if a.method != BEST):
+            mine = [a for a in self.attempts if (a.problem, a.method) == (problem, method)]
+            able = [a for a in mine if math.isfinite(best[a.problem, a.pair])]
+            ratios = [a.travel_time / best[a.problem, a.pair] for a in able if math.isfinite(a.travel_time)]
+            spread = np.percentile(ratios, QUARTILES).round(4).tolist() if ratios else [None] * len(QUARTILES)
+            names = [f"p{n}" for n in QUARTILES]
+            success = len(ratios) / len(able) if able else None
+            row = {"problem": problem, "method": method, "able": len(able), "success": success}
+            rows.append(row | dict(zip(names, spread, strict=True)))
+        return rows
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report for JSON; infinite times are null."""
+        outcomes = []
+        for one in self.outcomes:
+            row = {**asdict(one), "solved": one.solved, "over_reference": self.over_reference(one)}
+            outcomes.append(row | {"travel_time": one.travel_time if one.solved else None})
+        shares = {name: {"share": share, "legs": legs} for name, (share, legs) in self.completeness.items()}
+        references = {name: asdict(one) for name, one in self.references.items()}
+        known = {"references": references, "outcomes": outcomes, "completeness": shares}
+        return self.made | known | {"quality": self.quality()}
+
+    def __str__(self) -> str:
+        head = ("problem", "method", "route", "/ reference", "build", "edges", "pairs/s")
+        lines = [ROW.format(*head)]
+        for one in self.outcomes:
+            ratio = self.over_reference(one)
+            route = f"{one.travel_time:,.0f} s" if one.solved else "none"
+            built = ("", "", "")
+            if one.build_s is not None and one.pairs is not None:
+                built = f"{one.build_s:.2f} s", f"{one.edges:,}", f"{one.pairs / max(one.build_s, 1e-9):,.0f}"
+            lines.append(
+                ROW.format(one.problem, one.method, route, "" if ratio is None else f"{ratio:.3f}", *built)
+            )
+        lines.append("\nof the legs that brute force finds, the flow map has")
+        for name, (share, legs) in self.completeness.items():
+            lines.append(f"  {name:<17}{share:8.2%} of {legs:,}")
+        lines.append("\nrandom queries: success, and travel time over the best known, quartiles and 95 %")
+        for row in self.quality():
+            spread = "".join("       -" if row[f"p{n}"] is None else f"{row[f'p{n}']:8.3f}" for n in QUARTILES)
+            success = "-" if row["success"] is None else f"{row['success']:.0%}"
+            lines.append(f"  {row['problem']:<17}{row['method']:<16}{success:>5} of {row['able']:<4}{spread}")
+        return "\n".join(lines)
+
+
+def references() -> dict[str, Reference]:
+    """The suite's problems, shipped scenarios, by name, and what is known of them."""
+    text = (files("glider_stream") / "data" / "references.json").read_text(encoding="utf-8")
+    return {name: Reference(**fields) for name, fields in json.loads(text).items()}
+
+
+def run_suite(
+    only: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    pairs: int = 40,
+    progress: Callable[[str], None] = lambda said: None,
+) -> Report:
+    """Run the problems named in `only`, all if none; `pairs` random queries each; `quick`: few of all."""
+    known = references()
+    for name in only:
+        require(name in known, f"the problem {name!r} is not known; choose from: {', '.join(known)}")
+    require(pairs >= 1, f"`pairs` must be at least 1; got {pairs}")
+    chosen = {name: one for name, one in known.items() if name in only or not only}
+    outcomes: list[Outcome] = []
+    attempts: list[Attempt] = []
+    completeness: dict[str, tuple[float, int]] = {}
+    with threads(None) as count:
+        for name in chosen:
+            problem = read_scenario(name).problem()
+            roads = {method: _with(problem, steering) for method, steering in METHODS.items()}
+            planners = {method: Planner(build_roadmap(case), case) for method, case in roads.items()}
+            outcomes += [_outcome(name, method, planner) for method, planner in planners.items()]
+            outcomes += _baselines(name, problem)
+            position = planners["flow-map"].roadmap.position
+            completeness[name] = _completeness(roads["flow-map"], position, 2 if quick else 16)
+            attempts += _attempts(name, problem, planners, 2 if quick else pairs, 256 if quick else DENSE)
+            progress(f"{name}: {outcomes[-len(METHODS) - len(BASELINES)].travel_time:,.0f} s")
+    made = {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "processor": platform.processor() or platform.machine(),
+        "threads": count,
+        "software_version": version("glider-stream"),
+        "kernel_digest": KERNEL_DIGEST,
+        "quick": quick,
+    }
+    return Report(chosen, tuple(outcomes), tuple(attempts), completeness, made)
+
+
+def _with(problem: Problem, steering: Method) -> Problem:
+    return replace(problem, evaluator=replace(problem.evaluator, steering=steering))
+
+
+def _outcome(name: str, method: str, planner: Planner) -> Outcome:
+    road, path = planner.roadmap, planner.query()
+    return Outcome(name, method, path.travel_time, road.wall_s, road.target.size, road.evaluated)
+
+
+def _baselines(name: str, problem: Problem) -> list[Outcome]:
+    assert problem.start is not None
+    assert problem.goal is not None
+    return [
+        Outcome(name, method, baseline(problem, problem.start, problem.goal))
+        for method, baseline in BASELINES.items()
+    ]
+
+
+def _completeness(problem: Problem, position: Array, count: int) -> tuple[float, int]:
+    """Of the legs that brute force finds from some nodes to some others, the share that is found."""
+    rng, evaluator = np.random.default_rng(0), problem.evaluator
+    source = rng.choice(len(position), min(count, len(position)), replace=False)
+    target = np.sort(rng.choice(len(position), min(100, len(position)), replace=False))
+    dt, horizon = evaluator.integration.dt, evaluator.integration.dt * evaluator.integration.steps
+    ends = position, source, target, problem.departure
+    best = fastest_legs(evaluator.flow, evaluator.polar, *ends, *SCAN, dt, horizon).ravel()
+    indptr = np.arange(source.size + 1) * target.size
+    rows = evaluator.connect(position, problem.departure, source, indptr, np.tile(target, source.size))
+    found = rows[np.isfinite(best), 0] == Status.CONNECTED
+    return (float(found.mean()) if found.size else 1.0), found.size
+
+
+def _attempts(name: str, problem: Problem, planners: dict[str, Planner], count: int, dense: int) -> list[Attempt]:
+    """Queries between random points, by every planner and baseline, and by a denser roadmap."""
+    rng = np.random.default_rng(1)
+    points = rng.uniform(problem.lo, problem.hi, (8 * count, 3))
+    points = points[problem.evaluator.allowed(points, problem.departure)][: 2 * count]
+    ends = points.reshape(-1, 2, 3)
+    best = replace(
+        _with(problem, FlowMapMethod()),
+        sampler=SobolSampler(count=dense, seed=1),
+        law=Reachable(DENSE_LIMIT),
+    )
+    planners = planners | {BEST: Planner(build_roadmap(best), best)}
+    made = []
+    for pair, (start, goal) in enumerate(ends):
+        for method, planner in planners.items():
+            began = time.perf_counter()
+            path = planner.query(start, goal)
+            wall = time.perf_counter() - began
+            made.append(Attempt(name, method, pair, path.travel_time, wall, len(path.legs)))
+        for method, baseline in BASELINES.items():
+            began = time.perf_counter()
+            seconds = baseline(problem, start, goal)
+            made.append(Attempt(name, method, pair, seconds, time.perf_counter() - began, 0))
+    return made
+
+
+def write_report(report: Report, file: str | Path) -> None:
+    """Write a report as JSON."""
+    with replacing(Path(file)) as temporary:
+        temporary.write_text(json.dumps(report.as_dict(), indent=1) + "\n")
+
+
+def ompl_log(report: Report, problem: str) -> str:
+    """One problem's random queries as an OMPL benchmark log (ompl.kavrakilab.org/benchmark.html): a run each."""
+    mine = [one for one in report.attempts if one.problem == problem]
+    methods = list(dict.fromkeys(one.method for one in mine))
+    runs = len({one.pair for one in mine})
+    reference = report.references[problem]
+    lines = [
+        f"glider-stream version {report.made['software_version']}",
+        f"Experiment {problem}",
+        "1 experiment properties",
+        f"reference_s REAL = {math.nan if reference.seconds is None else reference.seconds}",
+        f"Running on {report.made['processor']}",
+        f"Starting at {report.made['date']}",
+        "<<<|",
+        f"{problem}: {reference.kind}, {reference.how}",
+        "|>>>",
+        "<<<|",
+        f"{report.made['processor']}, {report.made['threads']} threads",
+        "|>>>",
+        "1 is the random seed",
+        "0 seconds per run",
+        "0 MB per run",
+        f"{runs} runs per planner",
+        f"{sum(one.wall_s for one in mine)} seconds spent to collect the data",
+        "0 enum types",
+        f"{len(methods)} planners",
+    ]
+    for method in methods:
+        rows = [one for one in mine if one.method == method]
+        lines += [
+            method.replace(" ", "_"),
+            "0 common properties",
+            "4 properties for each run",
+            "time REAL",
+            "solved BOOLEAN",
+            "travel_time REAL",
+            "legs INTEGER",
+            f"{len(rows)} runs",
+        ]
+        for one in rows:
+            solved = math.isfinite(one.travel_time)
+            values = (one.wall_s, int(solved), one.travel_time if solved else math.nan, one.legs)
+            lines.append("".join(f"{value}; " for value in values))
+        lines.append(".")
+    return "\n".join(lines) + "\n"

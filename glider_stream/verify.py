@@ -1,0 +1,197 @@
+"""Verification: is a roadmap what it says; its legs flown again, by its own integrator and by another."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from .edges import Evaluator
+from .errors import InputError
+from .kernels.cache import entry_point
+from .kernels.control import glide_speed
+from .kernels.flow import Grid, OceanGrid, velocities
+from .kernels.motion import rk4_step
+from .kernels.terrain import allowed
+from .query import check_unchanged
+from .roadmap import EDGE_FIELDS, Problem, Roadmap
+from .settings import require
+from .store import read_roadmap
+from .threads import in_parallel, threads
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+LEGS_AT_ONCE = 10
+"""Legs that DOP853 flies together: its step is the one that the most crooked of them needs."""
+EDGES_AT_ONCE = 4096
+SAME = 0.1
+"""The same integrator must find the same miss, to this [m]: a closest approach lies on a step's chord."""
+MOST_OFF = {True: 0.5, False: 0.1}
+"""By how much [m] DOP853's miss may differ: on a grid, whose kinks RK4 steps over, and elsewhere."""
+WORST = 5
+QUANTILES = (0.5, 0.9, 0.99, 1.0)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What was looked at: `edges` flown again as they were found, `sample` of them by DOP853; `faults`, if any.
+
+    `differences` (sample,) [m]: between the replay's miss and the one that the roadmap says; `worst` edges.
+    """
+
+    file: str
+    edges: int
+    sample: int
+    faults: tuple[str, ...]
+    differences: Array
+    worst: tuple[tuple[int, int, float], ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.faults
+
+    def _quantiles(self) -> dict[str, float]:
+        if not self.differences.size:
+            return {}
+        values = np.quantile(self.differences, QUANTILES)
+        return {f"{share:.0%}": float(value) for share, value in zip(QUANTILES, values, strict=True)}
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `verify --json` says."""
+        return {
+            "file": self.file,
+            "holds": self.holds,
+            "faults": list(self.faults),
+            "edges": self.edges,
+            "sample": self.sample,
+            "difference_m": self._quantiles(),
+            "worst": [{"source": a, "target": b, "difference_m": off} for a, b, off in self.worst],
+        }
+
+    def __str__(self) -> str:
+        lines = [f"{self.file}: {'verified' if self.holds else 'NOT what it says'}"]
+        lines += [f"  fault: {fault}" for fault in self.faults]
+        if self.edges:
+            lines.append(f"  {self.edges:,} edges flown again, {self.sample:,} of them by DOP853")
+        if self.differences.size:
+            spread = ", ".join(f"{share} {1000 * off:.1f} mm" for share, off in self._quantiles().items())
+            lines.append(f"  its misses differ by: {spread}")
+            worst = ", ".join(f"{a} to {b} ({1000 * off:.1f} mm)" for a, b, off in self.worst)
+            lines.append(f"  worst: {worst}")
+        return "\n".join(lines)
+
+
+def replayed_misses(
+    evaluator: Evaluator, departure: float, position: Array, source: Index, target: Index, values: Array
+) -> Array:
+    """How far from their targets [m] legs end, flown by scipy's DOP853 in the full flow: (n,).
+
+    Legs from `source` to `target`, nodes of `position` (m, 3) [m]; `values` (n, 6) in the order of EDGE_FIELDS.
+    """
+    column = {name: n for n, name in enumerate(EDGE_FIELDS)}
+
+    def rate(share: float, at: Array, z: Array, u: Array, v: Array, w: Array, duration: Array) -> Array:
+        along = share * duration
+        flow_u, flow_v = velocities(evaluator.flow, *at.reshape(2, -1), z + along * w, departure + along).T
+        return np.concatenate([(flow_u + u) * duration, (flow_v + v) * duration])
+
+    off = np.empty(len(values))
+    for first in range(0, len(values), LEGS_AT_ONCE):
+        some = slice(first, first + LEGS_AT_ONCE)
+        (x, y, z), goal, row = position[source[some]].T, position[target[some]].T, values[some].T
+        angle, heading, speed = (row[column[name]] for name in ("glide_angle", "heading", "speed"))
+        along, w, duration = speed * np.cos(angle), speed * np.sin(angle), row[column["time"]]
+        through = along * np.cos(heading), along * np.sin(heading), w
+        path = solve_ivp(
+            rate, (0, 1), np.concatenate([x, y]), args=(z, *through, duration), method="DOP853", rtol=1e-10,
+            atol=1e-7, max_step=0.02,
+        )  # fmt: skip
+        end = *path.y[:, -1].reshape(2, -1), z + duration * w
+        off[some] = np.linalg.norm(np.array(end) - goal, axis=0)
+    return off
+
+
+@entry_point(nogil=True)
+def _fly(medium, position, departure, source, target, values, off, first, last):  # type: ignore[no-untyped-def]
+    """Distance [m] from their targets at which legs end, and what their speed is off by [m/s]: off (n, 2)."""
+    dt = medium.integration.dt
+    for e in range(first, last):
+        time, angle, heading, speed = values[e, 0], values[e, 2], values[e, 3], values[e, 4]
+        along, w = speed * np.cos(angle), speed * np.sin(angle)
+        u, v = along * np.cos(heading), along * np.sin(heading)
+        x, y, z = position[source[e]]
+        full = int(time / dt)
+        for n in range(full + 1):
+            step = min(dt, time - n * dt)
+            x, y = rk4_step(medium.flow, x, y, z + n * dt * w, departure + n * dt, u, v, w, step)
+        goal = position[target[e]]
+        off[e, 0] = np.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z + time * w - goal[2]) ** 2)
+        off[e, 1] = speed - glide_speed(medium.polar, 1 if angle > 0.0 else 0, abs(angle))
+
+
+def verify(file: str | Path, problem_of: Any, sample: int = 200) -> Verification:
+    """Look at a roadmap file: whole, made by the flow and glider that its scenario names, its legs as they say.
+
+    `problem_of` makes a problem of the scenario's text. All edges are flown again as they were found, a
+    `sample` of them, all where it is 0, by DOP853 too.
+    """
+    require(sample >= 0, f"`sample` must be at least 0, all; got {sample}")
+    require(Path(file).is_file(), f"the roadmap {file} does not exist; build it first")
+    try:
+        road = read_roadmap(file)
+        problem: Problem = problem_of(road.provenance.scenario)
+        check_unchanged(road, problem)
+    except InputError as error:
+        return Verification(str(file), 0, 0, (str(error),), np.empty(0), ())
+    return check_edges(str(file), road, problem, sample)
+
+
+def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Verification:
+    """What `verify` says of a roadmap that could be read."""
+    evaluator, position = problem.evaluator, np.require(road.position, np.float64, ["C", "W"])
+    source = np.repeat(np.arange(len(position)), np.diff(road.indptr))
+    target = road.target.astype(np.int64)
+    values = np.ascontiguousarray(np.stack([getattr(road, field) for field in EDGE_FIELDS], axis=1))
+    off = np.empty((target.size, 2))
+    with threads(None):
+        task = partial(_fly, evaluator.medium, position, problem.departure, source, target, values, off)
+        in_parallel(task, target.size, EDGES_AT_ONCE)
+    horizon = evaluator.integration.dt * evaluator.integration.steps
+    polar = evaluator.polar
+    angle = np.abs(road.glide_angle)
+    direction = (road.glide_angle > 0).astype(np.intp)
+    rise = position[target, 2] - position[source, 2]
+    in_water = np.array([allowed(evaluator.terrain, *place) for place in position], bool)
+    looks = {
+        "lead to where they begin or to the same depth": (rise == 0) | (source == target),
+        "climb where they should dive, or dive": np.sign(rise) != np.sign(road.glide_angle),
+        "cost something else than their time": road.cost != road.time,
+        "take no time or longer than the horizon": (road.time <= 0)
+        | (road.time > horizon + evaluator.integration.dt),
+        "have a glide angle outside the polar": (angle < polar.shallowest[direction] - 1e-9)
+        | (angle > polar.steepest[direction] + 1e-9),
+        "have a speed that is not the polar's": np.abs(off[:, 1]) > 1e-6,
+        "miss by more than the tolerance": road.miss >= evaluator.integration.tolerance,
+        "begin or end where no glider may be": ~(in_water[source] & in_water[target]),
+        "do not end where they say": ~(np.abs(off[:, 0] - road.miss) <= SAME),
+    }
+    faults = [
+        f"{int(bad.sum()):,} edges {what}, the first from node {source[bad][0]} to {target[bad][0]}"
+        for what, bad in looks.items()
+        if bad.any()
+    ]
+    size = target.size if sample == 0 else min(sample, target.size)
+    some = np.sort(np.random.default_rng(0).choice(target.size, size, replace=False))
+    ends = evaluator, problem.departure, position, source[some], target[some], values[some]
+    differences = np.abs(replayed_misses(*ends) - road.miss[some])
+    most = MOST_OFF[isinstance(evaluator.flow, Grid | OceanGrid)]
+    far = differences > most
+    if far.any():
+        faults.append(f"{int(far.sum()):,} edges of the sample end more than {most:g} m elsewhere by DOP853")
+    order = np.argsort(-differences)[:WORST]
+    worst = tuple((int(source[some][n]), int(target[some][n]), float(differences[n])) for n in order)
+    return Verification(name, target.size, size, tuple(faults), differences, worst)

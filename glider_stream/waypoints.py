@@ -1,0 +1,50 @@
+"""Waypoints: the places where a route surfaces, and how vehicles' files write them."""
+
+from dataclasses import dataclass
+
+from .path import Path
+from .settings import require
+
+SURFACE = 10.0
+"""A leg that ends no deeper [m] ends at the surface."""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place to fly to, longitude and latitude [degrees]."""
+
+    lon: float
+    lat: float
+
+
+def waypoints(path: Path) -> list[Waypoint]:
+    """Where a geographic route surfaces, and its goal."""
+    require(path.lonlat is not None, "waypoints need longitude and latitude; plan in a geographic scenario")
+    assert path.lonlat is not None
+    ends = [(leg.lonlat[1], leg.end[2]) for leg in path.legs[:-1] if leg.lonlat is not None]
+    places = [place for place, z in ends if z >= -SURFACE]
+    return [Waypoint(float(lon), float(lat)) for lon, lat in (*places, path.lonlat[1])]
+
+
+def degrees_and_minutes(degrees: float) -> str:
+    """DDDMM.mmmm, as vehicles read it: 74 degrees 11.587 minutes west are -7411.5870.
+
+    The sign is that of the whole number; 59.99999 minutes carry.
+    """
+    minutes = round(abs(degrees) * 60, 4)
+    packed = 100 * int(minutes // 60) + minutes % 60
+    return f"{'-' if degrees < 0 and minutes > 0 else ''}{packed:.4f}"
+
+
+def from_degrees_and_minutes(text: str) -> float:
+    """Degrees of DDDMM.mmmm; ValueError where it is no such number."""
+    packed = float(text)
+    whole, minutes = divmod(abs(packed), 100)
+    if not minutes < 60 or whole > 180:
+        raise ValueError(f"{text} has {minutes:g} minutes or too many degrees")
+    return (whole + minutes / 60) * (-1 if text.strip().startswith("-") else 1)
+
+
+def wrapped_lon(lon: float) -> float:
+    """A longitude in [-180, 180) degrees."""
+    return (lon + 180) % 360 - 180
