@@ -147,6 +147,12 @@ def series(rows: list[Row], value: str, against: Callable[[list[Row]], float | N
     return result
 
 
+def over_flow_map(rows: list[Row]) -> list[Row]:
+    """The rows with `route`: the travel time over the flow map's in the same field, None where there is none."""
+    best = {row["seed"]: row["route_s"] for row in rows if row["method"] == "flow map"}
+    return [row | {"route": row["route_s"] and row["route_s"] / best[row["seed"]]} for row in rows]
+
+
 def arguments(document: str) -> argparse.Namespace:
     """What each of the three scripts is told."""
     parser = argparse.ArgumentParser(description=document.splitlines()[0])

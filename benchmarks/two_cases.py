@@ -8,6 +8,8 @@ Draws seed-box-16.png and seed-box-54.png into the folder.
 import argparse
 from pathlib import Path
 
+from PIL import Image
+
 from glider_stream import planner
 
 CASES = (16, 54)
@@ -24,4 +26,6 @@ if __name__ == "__main__":
         roadmap = planner.build("seed-box", overrides=overrides)
         path = planner.query(roadmap)
         print(f"{candidates} controls: {roadmap}\n{path}")
-        planner.plot(roadmap, path, options.output / f"seed-box-{candidates}.png")
+        file = options.output / f"seed-box-{candidates}.png"
+        planner.plot(roadmap, path, file)
+        Image.open(file).convert("RGB").quantize(128).save(file, optimize=True)

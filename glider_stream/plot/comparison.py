@@ -36,6 +36,8 @@ def plot_comparison(
 ) -> "Figure":
     """Draw means and intervals of up to four series over a common axis; `labels` with units."""
     with styled():
+        from matplotlib.ticker import LogLocator, NullFormatter
+
         figure = new_figure(6.2, 4.2, title)
         axes = figure.add_subplot()
         axes.set(xlabel=labels[0], ylabel=labels[1], xscale=scales[0], yscale=scales[1])
@@ -52,11 +54,18 @@ def plot_comparison(
                 [p.x or 0.0 for p in points], [p.mean for p in points], yerr=[below, above], label=one.name,
                 color=colour, marker=marker, linestyle=line, markersize=4.5, capsize=2.5, linewidth=1.2,
             )  # fmt: skip
+            # notes of the first series above, of others below: they rarely meet
+            up = 1 if one is series[0] else -1
             for p in points:
                 axes.annotate(
-                    p.note, (p.x or 0.0, p.high), xytext=(0, 3), textcoords="offset points", ha="center",
-                    fontsize=6.5, color=colour,
+                    p.note, (p.x or 0.0, p.high if up > 0 else p.low), xytext=(0, 4 * up), color=colour,
+                    textcoords="offset points", ha="center", va="bottom" if up > 0 else "top", fontsize=6.5,
                 )  # fmt: skip
+        for axis, scale in ((axes.xaxis, scales[0]), (axes.yaxis, scales[1])):
+            if scale == "log":
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axis.set_major_formatter(lambda value, place: f"{value:,.10g}")
+                axis.set_minor_formatter(NullFormatter())
         axes.grid(color=GREY, alpha=0.3, linewidth=0.5)
         axes.legend(frameon=False)
         return frozen(figure)
