@@ -13,7 +13,7 @@ from .edges import Evaluator
 from .errors import InputError
 from .kernels.cache import entry_point
 from .kernels.control import glide_speed
-from .kernels.flow import Grid, OceanGrid, velocities
+from .kernels.flow import velocities
 from .kernels.motion import rk4_step
 from .kernels.terrain import allowed
 from .query import check_unchanged
@@ -29,8 +29,8 @@ LEGS_AT_ONCE = 10
 EDGES_AT_ONCE = 4096
 SAME = 0.1
 """The same integrator must find the same miss, to this [m]: a closest approach lies on a step's chord."""
-MOST_OFF = {True: 0.5, False: 0.1}
-"""By how much [m] DOP853's miss may differ: on a grid, whose kinks RK4 steps over, and elsewhere."""
+MOST_OFF = 0.5
+"""By how much DOP853's miss may differ, in tolerances of the scenario: RK4 steps over the kinks of a grid."""
 WORST = 5
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
@@ -188,7 +188,7 @@ def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Veri
     some = np.sort(np.random.default_rng(0).choice(target.size, size, replace=False))
     ends = evaluator, problem.departure, position, source[some], target[some], values[some]
     differences = np.abs(replayed_misses(*ends) - road.miss[some])
-    most = MOST_OFF[isinstance(evaluator.flow, Grid | OceanGrid)]
+    most = MOST_OFF * evaluator.integration.tolerance
     far = differences > most
     if far.any():
         faults.append(f"{int(far.sum()):,} edges of the sample end more than {most:g} m elsewhere by DOP853")
