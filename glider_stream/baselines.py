@@ -61,9 +61,8 @@ def _flown(problem: Problem, start: Array, stops: Array, speed: float, sink: flo
 def best_glide(problem: Problem) -> tuple[float, float]:
     """The greatest horizontal speed of the glide polar, and the vertical speed there [m/s]."""
     table = problem.evaluator.polar
-    angles = np.linspace(table.shallowest[0], table.steepest[0], table.speed.shape[1])
-    level, sink = table.speed[0] * np.cos(angles), table.speed[0] * np.sin(angles)
-    return float(level.max()), float(sink[level.argmax()])
+    speed = float(table.best_horizontal[0])
+    return speed, speed * math.tan(float(table.best_angle[0]))
 
 
 def straight(problem: Problem, start: Array, goal: Array) -> float:
@@ -88,9 +87,9 @@ def depth_averaged(problem: Problem, start: Array, goal: Array) -> float:
     x, y = (np.arange(lo[m] + step / 2, hi[m], step) for m in range(2))
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     places = np.vstack([grid, start[:2], goal[:2]])
-    flow, speed = problem.evaluator.flow, best_glide(problem)[0]
+    speed = best_glide(problem)[0]
     current = np.mean([_currents(problem, places, z) for z in np.linspace(lo[2], hi[2], DEPTHS)], axis=0)
-    inside = np.array([bool(contains(flow, float(x), float(y), problem.departure)) for x, y in places])
+    inside = problem.evaluator.allowed(np.insert(places, 2, hi[2], axis=1), problem.departure)
     near = np.hypot(*(places[:, None] - places[None]).T) <= (REACH + 0.5) * step
     source, target = np.nonzero(near & inside & inside[:, None] & ~np.eye(len(places), dtype=bool))
     away = places[target] - places[source]

@@ -137,17 +137,22 @@ def bench(
                     figures.append(figure)
     return Record(
         tuple(figures),
-        {
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "processor": platform.processor() or platform.machine(),
-            "threads": count,
-            "python": platform.python_version(),
-            "numba": version("numba"),
-            "software_version": version("glider-stream"),
-            "kernel_digest": KERNEL_DIGEST,
-            "quick": quick,
-        },
+        made_by(count, quick),
     )
+
+
+def made_by(thread_count: int, quick: bool) -> dict[str, Any]:
+    """When and on what a record is made."""
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "processor": platform.processor() or platform.machine(),
+        "threads": thread_count,
+        "python": platform.python_version(),
+        "numba": version("numba"),
+        "software_version": version("glider-stream"),
+        "kernel_digest": KERNEL_DIGEST,
+        "quick": quick,
+    }
 
 
 @entry_point(nogil=True)
@@ -345,7 +350,7 @@ def read_record(file: str | Path) -> dict[str, Any]:
     return dict(record)
 
 
-def write_record(record: Record, file: str | Path) -> None:
-    """Write a record as JSON."""
+def write_record(record: dict[str, Any], file: str | Path) -> None:
+    """Write a record, as a table, as JSON."""
     with replacing(Path(file)) as temporary:
-        temporary.write_text(json.dumps(record.as_dict(), indent=1) + "\n")
+        temporary.write_text(json.dumps(record, indent=1) + "\n")

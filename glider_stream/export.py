@@ -13,12 +13,12 @@ from pathlib import Path as File
 from typing import Any
 from xml.etree import ElementTree as Xml
 
+from .frame import wrapped
 from .path import Leg, Path
 from .seaglider import targets
 from .settings import require
-from .slocum import NAME, mission_files
+from .slocum import list_number, mission_files
 from .store import check_output, replacing
-from .waypoints import wrapped_lon
 
 Texts = dict[str, str]
 
@@ -29,7 +29,7 @@ def _json(path: Path, name: str) -> Texts:
 
 def _place(lonlat: Any, z: float) -> list[float]:
     lon, lat = lonlat
-    return [round(wrapped_lon(float(lon)), 7), round(float(lat), 7), round(float(z), 2) + 0.0]
+    return [round(float(wrapped(lon, 0.0)), 7), round(float(lat), 7), round(float(z), 2) + 0.0]
 
 
 def _track(path: Path) -> list[list[float]]:
@@ -176,8 +176,8 @@ def check_export(file: str | File) -> None:
     form, known = _form(file), ", ".join(EXPORTS)
     got = repr(form or "no ending")
     require(form in EXPORTS, f"the route file {file} must end in one of: {known}; got {got}")
-    slocum = form != ".ma" or NAME.fullmatch(File(file).name) is not None
-    require(slocum, f"a Slocum goto list must be called goto_lNN.ma, NN two digits; got {File(file).name}")
+    if form == ".ma":
+        list_number(File(file).name)
     check_output(file)
 
 

@@ -184,7 +184,7 @@ def bench(
     before = None if against is None else read_record(against)
     record = bench(**options)
     if output is not None:
-        write_record(record, output)
+        write_record(record.as_dict(), output)
     return record, [] if before is None else record.moved(before)
 
 
@@ -193,7 +193,8 @@ def suite(output: str | File | None = None, *, ompl: str | File | None = None, *
 
     Written as JSON where `output` says; a log per problem, as OMPL's tools read them, into the folder `ompl`.
     """
-    from .suite import ompl_log, run_suite, write_report
+    from .bench import write_record
+    from .suite import ompl_log, run_suite
 
     if output is not None:
         check_output(output)
@@ -201,7 +202,7 @@ def suite(output: str | File | None = None, *, ompl: str | File | None = None, *
         require(File(ompl).is_dir(), f"the folder {ompl} for logs is none; make it first")
     report = run_suite(**options)
     if output is not None:
-        write_report(report, output)
+        write_record(report.as_dict(), output)
     if ompl is not None:
         for name in report.references:
             (File(ompl) / f"{name}.log").write_text(ompl_log(report, name))

@@ -9,9 +9,10 @@ import re
 
 import numpy as np
 
+from .frame import wrapped
 from .path import Path
 from .settings import require
-from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints, wrapped_lon
+from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 MOST_WAYPOINTS = 8
 """Waypoints that a goto list may hold."""
@@ -20,12 +21,17 @@ WITHIN = 500
 NAME = re.compile(r"goto_l(\d\d)\.ma")
 
 
-def mission_files(path: Path, name: str, most: int = MOST_WAYPOINTS) -> dict[str, str]:
-    """A route as numbered goto lists of `most` waypoints each, the first called `name`, and one yo file."""
+def list_number(name: str) -> int:
+    """The NN of goto_lNN.ma; InputError where the name is another."""
     fits = NAME.fullmatch(name)
     require(fits is not None, f"a Slocum goto list must be called goto_lNN.ma, NN two digits; got {name}")
     assert fits is not None
-    places, first = waypoints(path), int(fits[1])
+    return int(fits[1])
+
+
+def mission_files(path: Path, name: str, most: int = MOST_WAYPOINTS) -> dict[str, str]:
+    """A route as numbered goto lists of `most` waypoints each, the first called `name`, and one yo file."""
+    places, first = waypoints(path), list_number(name)
     parts = [places[n : n + most] for n in range(0, len(places), most)]
     last = first + len(parts) - 1
     require(last <= 99, f"{len(places)} waypoints need the lists {first} to {last}, past 99; begin lower")
@@ -35,7 +41,7 @@ def mission_files(path: Path, name: str, most: int = MOST_WAYPOINTS) -> dict[str
 
 def goto_list(places: list[Waypoint]) -> str:
     """The text of a goto list: longitude first, degrees and minutes packed; flown once, in order."""
-    rows = [f"{degrees_and_minutes(wrapped_lon(at.lon))}\t{degrees_and_minutes(at.lat)}" for at in places]
+    rows = [f"{degrees_and_minutes(float(wrapped(at.lon, 0.0)))}\t{degrees_and_minutes(at.lat)}" for at in places]
     return "\n".join([
         "behavior_name=goto_list",
         "<start:b_arg>",

@@ -2,23 +2,19 @@
 
 import json
 import math
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
-from importlib.metadata import version
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .baselines import BASELINES
+from .bench import made_by
 from .brute_force import fastest_legs
 from .edges import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
-from .kernels.cache import KERNEL_DIGEST
 from .kernels.edges import Status
 from .neighbours import Reachable
 from .query import Planner
@@ -26,7 +22,6 @@ from .roadmap import Problem, build_roadmap
 from .sampling import SobolSampler
 from .scenario import read_scenario
 from .settings import require
-from .store import replacing
 from .threads import threads
 
 Array = NDArray[np.float64]
@@ -189,15 +184,7 @@ def run_suite(
             completeness[name] = _completeness(roads["flow-map"], position, 2 if quick else 16)
             attempts += _attempts(name, problem, planners, 2 if quick else pairs, 256 if quick else DENSE)
             progress(f"{name}: {outcomes[-len(METHODS) - len(BASELINES)].travel_time:,.0f} s")
-    made = {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "processor": platform.processor() or platform.machine(),
-        "threads": count,
-        "software_version": version("glider-stream"),
-        "kernel_digest": KERNEL_DIGEST,
-        "quick": quick,
-    }
-    return Report(chosen, tuple(outcomes), tuple(attempts), completeness, made)
+    return Report(chosen, tuple(outcomes), tuple(attempts), completeness, made_by(count, quick))
 
 
 def _with(problem: Problem, steering: Method) -> Problem:
@@ -256,12 +243,6 @@ def _attempts(name: str, problem: Problem, planners: dict[str, Planner], count: 
             seconds = baseline(problem, start, goal)
             made.append(Attempt(name, method, pair, seconds, time.perf_counter() - began, 0))
     return made
-
-
-def write_report(report: Report, file: str | Path) -> None:
-    """Write a report as JSON."""
-    with replacing(Path(file)) as temporary:
-        temporary.write_text(json.dumps(report.as_dict(), indent=1) + "\n")
 
 
 def ompl_log(report: Report, problem: str) -> str:

@@ -43,8 +43,3 @@ def from_degrees_and_minutes(text: str) -> float:
     if not minutes < 60 or whole > 180:
         raise ValueError(f"{text} has {minutes:g} minutes or too many degrees")
     return (whole + minutes / 60) * (-1 if text.strip().startswith("-") else 1)
-
-
-def wrapped_lon(lon: float) -> float:
-    """A longitude in [-180, 180) degrees."""
-    return (lon + 180) % 360 - 180

@@ -42,6 +42,7 @@ def test_a_sound_roadmap_holds(sound, capsys):
     ("name", "change"),
     [
         ("time", lambda value: 1.01 * value),
+        ("time", lambda value: 1e300),
         ("heading", lambda value: value + math.radians(1)),
         ("glide_angle", lambda value: 0.99 * value),
         ("speed", lambda value: 1.01 * value),
