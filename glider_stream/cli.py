@@ -28,6 +28,14 @@ def place_and_time(text: str) -> tuple[Any, ...]:
     return place(text, texts=1)
 
 
+def key_and_value(text: str) -> tuple[str, Any]:
+    """A key, and its value: a whole number, or a text."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip() or not value.strip():
+        raise click.BadParameter(f"{text!r} is not KEY=VALUE, such as units=cm/s")
+    return key.strip(), int(value) if value.strip().isdecimal() else value.strip()
+
+
 def _write_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=1))
 
@@ -126,12 +134,22 @@ def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ..
     metavar="LON,LAT,DEPTH[,TIME]",
     help="Sample the current here.",
 )
+@click.option(
+    "--name",
+    "names",
+    multiple=True,
+    type=key_and_value,
+    metavar="KEY=VALUE",
+    help="What the files do not say, as in [flow.names]: u, v, lon, lat, depth, time, units, rotate, ...",
+)
 @JSON
-def describe(currents: tuple[Path, ...], at: tuple[Any, ...], as_json: bool) -> None:
+def describe(
+    currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
+) -> None:
     """Say what the current files CURRENTS hold, and what the planner takes for what."""
     from . import planner
 
-    description = planner.describe(currents, [(*place, None)[:4] for place in at])
+    description = planner.describe(currents, [(*place, None)[:4] for place in at], dict(names))
     if as_json:
         _write_json(description.as_dict())
     else:

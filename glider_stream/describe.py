@@ -1,6 +1,6 @@
 """What a current file holds and what the planner takes for what, before anyone trusts a route."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from .frame import MAX_SCALE_ERROR, LocalFrame
-from .ocean import Names, OceanFile, divergence_ratio, read_currents, sample
-from .ocean_flow import EARTH, index_map
+from .ocean import LonLatGrid, Names, OceanFile, divergence_ratio, index_map, read_currents, sample
 
 Place = tuple[float, float, float | None, str | None]
 
@@ -54,11 +53,17 @@ class Description:
 
     @property
     def spacing(self) -> tuple[float, float, float, float]:
-        """Median spacing in longitude and latitude [degrees], then in both [km], at mid-latitude."""
-        lon, lat = (float(np.median(np.diff(axis))) for axis in (self.file.lon, self.file.lat))
-        km = np.radians(1.0) * EARTH / 1000
-        middle = np.radians((self.file.lat[0] + self.file.lat[-1]) / 2)
-        return lon, lat, float(lon * km * np.cos(middle)), float(lat * km)
+        """Median spacing in longitude and latitude [degrees], then along rows and across them [km]."""
+        lon, lat = self.file.grid.mesh()
+        steps = np.diff(lon % 360, axis=1), np.diff(lat, axis=0)
+        east, north = (float(np.median(np.abs(step))) for step in steps)
+        along, across = self.file.grid.cell_sizes()
+        return east, north, float(np.median(along)) / 1000, float(np.median(across)) / 1000
+
+    @property
+    def shape_of_grid(self) -> str:
+        """Whether its rows follow parallels."""
+        return "regular" if isinstance(self.file.grid, LonLatGrid) else "curved"
 
     @property
     def land(self) -> float:
@@ -71,8 +76,9 @@ class Description:
         return {
             "file": file.name,
             "took": file.took,
-            "lon": [float(file.lon[0]), float(file.lon[-1])],
-            "lat": [float(file.lat[0]), float(file.lat[-1])],
+            "grid": self.shape_of_grid,
+            "lon": list(file.grid.bounds[0]),
+            "lat": list(file.grid.bounds[1]),
             "shape": dict(zip(("time", "depth", "lat", "lon"), file.u.shape, strict=True)),
             "spacing_degrees": list(spacing[:2]),
             "spacing_km": list(spacing[2:]),
@@ -100,9 +106,12 @@ class Description:
         nt, nz, ny, nx = file.u.shape
         lines = [file.name]
         lines += [f"  {key:<12}{what}" for key, what in file.took.items()]
-        lines.append(f"  extent      lon {file.lon[0]:.5g} to {file.lon[-1]:.5g}, ")
-        lines[-1] += f"lat {file.lat[0]:.5g} to {file.lat[-1]:.5g}; {100 * self.land:.0f} % land"
-        lines.append(f"  grid        {nx} x {ny} points, every {dlon:.4g} x {dlat:.4g} degrees")
+        (west, east_end), (south, north_end) = file.grid.bounds
+        lines.append(f"  extent      lon {west:.5g} to {east_end:.5g}, ")
+        lines[-1] += f"lat {south:.5g} to {north_end:.5g}; {100 * self.land:.0f} % land"
+        lines.append(
+            f"  grid        {self.shape_of_grid}, {nx} x {ny} points, every {dlon:.4g} x {dlat:.4g} degrees"
+        )
         lines[-1] += f", {east:.3g} x {north:.3g} km"
         lines.append(f"  times       {file.time_range}" + (f", {nt} of them" if nt > 1 else ""))
         levels = "not said" if file.surface else f"{file.depth[0]:.4g} to {file.depth[-1]:.6g} m, {nz} levels"
@@ -161,7 +170,9 @@ def _level(file: OceanFile, k: int) -> Level:
 
 
 def describe(
-    files: str | Path | Sequence[str | Path], at: Sequence[Place] = (), names: Names | None = None
+    files: str | Path | Sequence[str | Path],
+    at: Sequence[Place] = (),
+    names: Names | Mapping[str, Any] | None = None,
 ) -> Description:
     """What the current files hold, and the current at some places: (lon, lat, depth [m], time or None).
 
@@ -175,7 +186,7 @@ def describe(
     near = dict.fromkeys(
         int(np.abs(file.depth - d).argmin()) for d in (*DEPTHS, file.depth[-1]) if d <= file.depth[-1]
     )
-    lon, lat = (float(file.lon[0]), float(file.lon[-1])), (float(file.lat[0]), float(file.lat[-1]))
+    lon, lat = file.grid.bounds
     frame = LocalFrame.over(lon, lat)
     # half around the globe the stereographic scale has long left every bound
     frame_error = 1.0 if lon[1] - lon[0] >= 180 else min(1.0, frame.scale_error(lon, lat))
@@ -184,6 +195,6 @@ def describe(
         levels=tuple(_level(file, k) for k in near),
         divergence_ratio=_finite(divergence_ratio(file)),
         frame_error=frame_error,
-        map_error=None if frame_error > MAX_SCALE_ERROR else index_map(frame, file.lon, file.lat).error,
+        map_error=None if frame_error > MAX_SCALE_ERROR else index_map(frame, file.grid).error,
         points=tuple(points),
     )

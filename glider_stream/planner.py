@@ -1,6 +1,6 @@
 """The planner: one call for each command."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os.path import realpath
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
@@ -158,7 +158,9 @@ def plot_steering(
 
 
 def describe(
-    currents: str | File | Sequence[str | File], at: Sequence["Place"] = (), names: "Names | None" = None
+    currents: str | File | Sequence[str | File],
+    at: Sequence["Place"] = (),
+    names: "Names | Mapping[str, Any] | None" = None,
 ) -> "Description":
     """What current files hold, and what the planner takes for what; the current at places `at`.
 

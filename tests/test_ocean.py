@@ -23,7 +23,8 @@ from glider_stream.ocean import (
     read_currents,
     sample,
 )
-from glider_stream.ocean_flow import MAP_ERROR, bottoms, filled, index_map, lower_faces, slots
+from glider_stream.ocean.flow import bottoms, filled, lower_faces, slots
+from glider_stream.ocean.grid import MAP_ERROR, LonLatGrid, index_map
 
 xr = pytest.importorskip("xarray")
 pyproj = pytest.importorskip("pyproj")
@@ -306,15 +307,6 @@ def test_a_user_may_name_everything(tmp_path):
         read_currents(path, {"w": "p"})
 
 
-def curved(data):
-    lon, lat = np.meshgrid(LON, LAT)
-    data = data.drop_vars(["lon", "lat"]).rename(lon="x", lat="y")
-    return data.assign_coords(
-        nav_lon=(("y", "x"), lon, {"units": "degrees_east"}),
-        nav_lat=(("y", "x"), lat, {"units": "degrees_north"}),
-    )
-
-
 def staggered(data):
     v = data.vo.rename(lon="lon_v").assign_coords(lon_v=LON + 0.05)
     return data.drop_vars("vo").assign(vo=v)
@@ -330,23 +322,13 @@ def without_attr(data, name, key):
     return data
 
 
-def along_axes(data):
-    return with_attrs(
-        with_attrs(data, "uo", standard_name="sea_water_x_velocity"),
-        "vo",
-        standard_name="sea_water_y_velocity",
-    )
-
-
 REFUSALS = {
     "unit": (lambda d: with_attrs(d, "uo", units="furlong/fortnight"), "furlong/fortnight"),
     "no unit": (lambda d: renamed(d, "u", "v"), "has no unit .* name `units`"),
     "no unit and too fast": (lambda d: renamed(units(d, "", 0.01), "uo", "vo"), "has no unit"),
     "wrong unit": (lambda d: both(d, lambda one: 100 * one), "no ocean current"),
-    "curvilinear": (curved, "curvilinear .*`nav_lon`"),
-    "staggered": (staggered, "staggered"),
-    "grid axes": (along_axes, "along the grid's axes"),
-    "sigma": (lambda d: with_attrs(d, "depth", standard_name="ocean_s_coordinate_g2"), "terrain-following"),
+    "half staggered": (staggered, "different points that make no staggered grid"),
+    "sigma": (lambda d: with_attrs(d, "depth", standard_name="ocean_s_coordinate_g2"), "no depth of the seabed"),
     "pressure": (lambda d: with_attrs(d, "depth", units="dbar"), "'dbar'"),
     "heights": (lambda d: with_attrs(d, "depth", positive="up"), "positive up"),
     "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no longitude"),
@@ -381,7 +363,6 @@ def test_refused_in_one_sentence(tmp_path, case):
 def test_a_user_may_overrule(tmp_path):
     expected = pytest.approx(current(*PLACE[:3], 15.0), abs=TOLERANCE)
     for change, names in (
-        (along_axes, Names(u="uo", v="vo")),
         (lambda d: with_attrs(d, "depth", positive="up"), Names(positive="down")),
         (lambda d: both(d, lambda one: 100 * one), Names(units="cm/s")),
     ):
@@ -534,7 +515,7 @@ def test_the_index_map_is_exact_to_a_metre():
         (LON, MERCATOR),
     ):
         frame = LocalFrame.over((lon[0], lon[-1]), (lat[0], lat[-1]))
-        at = index_map(frame, lon, lat)
+        at = index_map(frame, LonLatGrid(lon, lat))
         assert at.error <= MAP_ERROR
         for i, j in np.random.default_rng(3).uniform(0, (lon.size - 1, lat.size - 1), (100, 2)):
             place = np.interp(i, np.arange(lon.size), lon), np.interp(j, np.arange(lat.size), lat)

@@ -1,138 +1,42 @@
 """Currents on a grid into what the kernels read: an `OceanGrid` and the `Seabed` beneath it."""
 
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InputError
-from .frame import MAX_SCALE_ERROR, LocalFrame, Range, eastward, wrapped
-from .kernels.flow import OceanGrid, velocities
-from .kernels.terrain import Seabed, allowed
-from .settings import require
+from ..errors import InputError
+from ..frame import MAX_SCALE_ERROR, LocalFrame, Range
+from ..kernels.flow import OceanGrid, velocities
+from ..kernels.terrain import Seabed, allowed
+from ..settings import require
+from .file import OceanFile, parse_time
+from .grid import EVEN, IndexMap, index_map, span
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Times = NDArray[np.datetime64]
 
 MARGIN = 2
 """Cells kept around a domain: paths may stray."""
 HALO = 2
 """Further cells that fill the dry ones of the margin: a value does not depend on where the domain ends."""
-MAP_ERROR = 1.0
-"""The index map misplaces no point of the grid by more than this [m] ..."""
-MAP_SIDE = 1025
-"""... unless it grows beyond this many points on a side; then a hundredth of a cell must do."""
-EVEN = 1e-3
-"""An axis this close to even, in cells, is even: the rest is the rounding of its degrees."""
-EDGE = 0.01
-"""A point is on the grid up to this far beyond its ends, in cells: degrees come rounded."""
 DEPTH_SLACK = 0.01
-"""As EDGE, for the deepest level [m]."""
-EARTH = 6_371_000.0
+"""The deepest level holds for depths this far [m] beyond it: they come rounded."""
 
 
-@dataclass(frozen=True)
-class OceanFile:
-    """Currents as a file holds them, all conventions resolved.
-
-    `lon` (nx) rises eastward, `lat` (ny) northward [degrees]; `depth` (nz) rises downward [m]; `times` (nt)
-    UTC, or None if unknown. `u` east, `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data; `wet`
-    (nz, ny, nx) where there is data at every time. `surface`: the file names no depth, `depth` is [0].
-    `took` says what was taken for what; `notes` what else a user should know.
-    """
-
-    name: str
-    lon: Array
-    lat: Array
-    depth: Array
-    times: Times | None
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
-    wet: Bools
-    surface: bool
-    took: dict[str, str]
-    notes: tuple[str, ...] = ()
-
-    @property
-    def steady(self) -> bool:
-        """Whether it holds a single time."""
-        return self.times is None or self.times.size == 1
-
-    @property
-    def time_range(self) -> str:
-        """First and last time, for people."""
-        if self.times is None:
-            return "no time"
-        return " to ".join(f"{t}Z" for t in np.unique(self.times[[0, -1]]).astype("datetime64[s]"))
-
-
-def parse_time(text: str, what: str) -> np.datetime64:
-    """An ISO 8601 text as UTC; without a zone it is UTC."""
-    try:
-        when = datetime.fromisoformat(text.strip())
-    except (ValueError, AttributeError):
-        raise InputError(f"{what} must be a time such as 2024-11-20T12:00:00; got {text!r}") from None
-    if when.tzinfo is not None:
-        when = when.astimezone(UTC).replace(tzinfo=None)
-    return np.datetime64(when, "ms")
-
-
-def columns(lon: Array, centre: float) -> tuple[NDArray[np.intp], Array]:
-    """Indices and longitudes of the unbroken run of columns about `centre`, west to east, modulo 360.
-
-    Longitudes are within 180 degrees of the centre; a file that circles the globe has no seam there.
-    """
-    turned = wrapped(lon, centre)
-    order = np.argsort(turned, kind="stable")
-    turned = turned[order]
-    breaks = np.flatnonzero(np.diff(turned) > 1.5 * np.diff(lon).max()) + 1
-    runs = np.split(np.arange(lon.size), breaks)
-    run = max(runs, key=lambda r: (bool(turned[r[0]] <= centre <= turned[r[-1]]), r.size))
-    return order[run], turned[run]
-
-
-def _span(axis: Array, bounds: Range, margin: int) -> slice:
-    """Two points or more: the cells that hold the bounds, and a margin where there is one."""
-    first = max(0, min(int(np.searchsorted(axis, bounds[0], side="right")) - 1, axis.size - 2))
-    last = max(first + 1, min(int(np.searchsorted(axis, bounds[1], side="left")), axis.size - 1))
-    return slice(max(0, first - margin), min(axis.size, last + margin + 1))
-
-
-def _degrees(axis: Array) -> str:
-    return f"{axis[0]:.6g} to {axis[-1]:.6g}"
-
-
-def crop(
-    name: str, axes: tuple[Array, Array, Array | None], lon: Range, lat: Range, depth: Range, centre: float
-) -> tuple[NDArray[np.intp], Array, slice, slice]:
-    """Columns, their longitudes, rows and levels of a domain with margin and halo; InputError if outside."""
-    which, lons = columns(axes[0], centre)
-    west, east = eastward(lon)
-    middle = float(wrapped((west + east) / 2, centre))
-    half = (east - west) / 2
-    lon = (middle - half, middle + half)
-    for what, axis, bounds in (("longitude", lons, lon), ("latitude", axes[1], lat)):
-        require(bounds[0] <= bounds[1], f"the domain's {what} must rise; got {bounds[0]:g} to {bounds[1]:g}")
-        slack = EDGE * np.diff(axis).max() if axis.size > 1 else 0.0
-        require(
-            axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack,
-            f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
-            f"which holds {_degrees(axis)}",
-        )
-    levels = slice(0, 1)
-    if axes[2] is not None:
-        require(
-            depth[1] <= axes[2][-1] + DEPTH_SLACK,
-            f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} is at {axes[2][-1]:g} m",
-        )
-        if axes[2].size > 1:
-            span = _span(axes[2], depth, 0)
-            levels = slice(span.start, span.stop + 1)
-    span = _span(lons, lon, MARGIN + HALO)
-    return which[span], lons[span], _span(axes[1], lat, MARGIN + HALO), levels
+def levels_for(name: str, axis: Array | None, depth: Range) -> slice:
+    """The levels that a domain's depths [m] need, the first where there is no axis; InputError if too shallow."""
+    if axis is None:
+        return slice(0, 1)
+    require(
+        depth[1] <= axis[-1] + DEPTH_SLACK,
+        f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} is at {axis[-1]:g} m",
+    )
+    if axis.size == 1:
+        return slice(0, 1)
+    needed = span(axis, depth, 0)
+    return slice(needed.start, needed.stop + 1)
 
 
 def slots(points: Array) -> tuple[NDArray[np.uintp], float]:
@@ -180,86 +84,6 @@ def bottoms(wet: Bools, faces: Array) -> Array:
     """Height [m] of the bottom under each column of `wet` (nz, ...): 0 where the top level is dry."""
     deep = np.cumprod(wet, axis=0).sum(axis=0)
     return np.where(deep > 0, -faces[deep - 1], 0.0)
-
-
-def _fraction(axis: Array, at: Array) -> Array:
-    """Fractional index of values on a rising axis, straight on beyond its ends."""
-    even = np.linspace(axis[0], axis[-1], axis.size)
-    step = (axis[-1] - axis[0]) / (axis.size - 1)
-    if np.abs(axis - even).max() <= EVEN * step:
-        return np.asarray((at - axis[0]) / step)
-    below = np.clip(np.searchsorted(axis, at, side="right") - 1, 0, axis.size - 2)
-    return np.asarray(below + (at - axis[below]) / (axis[below + 1] - axis[below]))
-
-
-@dataclass(frozen=True)
-class IndexMap:
-    """The file's fractional indices at even points of the frame, as `OceanGrid` describes them.
-
-    `error` [m]: how far reading between the points misplaces a point of the grid, at worst.
-    """
-
-    index_map: Array
-    per_x: float
-    per_y: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    error: float
-
-
-def index_map(frame: LocalFrame, lon: Array, lat: Array) -> IndexMap:
-    """The map of a grid of longitudes and latitudes, as fine as MAP_ERROR asks."""
-    share = np.linspace(0, 1, 65)
-    west_east, south_north = lon[0] + share * (lon[-1] - lon[0]), lat[0] + share * (lat[-1] - lat[0])
-    rim_lon = np.concatenate([west_east, west_east, np.full(65, lon[0]), np.full(65, lon[-1])])
-    rim_lat = np.concatenate([np.full(65, lat[0]), np.full(65, lat[-1]), south_north, south_north])
-    x, y = frame.to_local(rim_lon, rim_lat)
-    # the rim bulges a little between the points above
-    pad_x, pad_y = 0.01 * np.ptp(x), 0.01 * np.ptp(y)
-    x_lo, x_hi, y_lo, y_hi = x.min() - pad_x, x.max() + pad_x, y.min() - pad_y, y.max() + pad_y
-    widest = np.cos(np.radians(np.abs(lat).min()))
-    cells = np.radians([np.diff(lon).max() * widest, np.diff(lat).max()]) * EARTH
-
-    def indices(side: int, shift_x: float, shift_y: float) -> Array:
-        px = x_lo + (np.arange(side) + shift_x) * (x_hi - x_lo) / (side - 1)
-        py = y_lo + (np.arange(side) + shift_y) * (y_hi - y_lo) / (side - 1)
-        at_lon, at_lat = frame.to_lonlat(*np.meshgrid(px, py, indexing="ij"))
-        return np.stack([_fraction(lon, at_lon), _fraction(lat, at_lat)], axis=-1)
-
-    side = 9
-    while True:
-        known, error = indices(side, 0, 0), 0.0
-        along = (known[1:, :] + known[:-1, :]) / 2
-        across = (known[:, 1:] + known[:, :-1]) / 2
-        for read, shift in (
-            (along, (0.5, 0.0)),
-            (across, (0.0, 0.5)),
-            ((along[:, 1:] + along[:, :-1]) / 2, (0.5, 0.5)),
-        ):
-            exact = indices(side, *shift)[: read.shape[0], : read.shape[1]]
-            inside = ((exact >= 0) & (exact <= [lon.size - 1, lat.size - 1])).all(axis=-1)
-            error = max(
-                error, float(np.hypot(*np.moveaxis((read - exact) * cells, -1, 0))[inside].max(initial=0))
-            )
-        if error <= MAP_ERROR or side >= MAP_SIDE:
-            break
-        side = 2 * side - 1
-    require(
-        error <= max(MAP_ERROR, 0.01 * cells.min()),
-        f"the grid is too uneven or too near a pole for a flat frame: points would be read {error:.0f} m off",
-    )
-    return IndexMap(
-        np.ascontiguousarray(known),
-        (side - 1) / (x_hi - x_lo),
-        (side - 1) / (y_hi - y_lo),
-        float(x_lo),
-        float(x_hi),
-        float(y_lo),
-        float(y_hi),
-        error,
-    )
 
 
 def _assemble(
@@ -334,38 +158,42 @@ def _build(
     margin: int = MARGIN,
 ) -> tuple[OceanGrid, Seabed]:
     during, seconds = _seconds(file, epoch)
-    axes = (file.lon, file.lat, None if file.surface else file.depth)
-    which, lons, rows, levels = crop(file.name, axes, lon, lat, depth, frame.lon)
-    lats, depths = file.lat[rows], file.depth[levels]
-    turn = frame.convergence(*np.meshgrid(lons, lats, indexing="ij"))
+    cut = file.grid.cut(file.name, lon, lat, frame.lon, MARGIN + HALO)
+    levels = levels_for(file.name, None if file.surface else file.depth, depth)
+    depths = file.depth[levels]
+    lons, lats = (part.T for part in cut.grid.mesh())
+    turn = frame.convergence(lons, lats)
     cos, sin = np.cos(turn), np.sin(turn)
 
     # the halo has done its work once the dry cells are filled; at the file's edge there is none to drop
-    west, east = eastward(lon)
-    middle = float(wrapped((west + east) / 2, frame.lon))
-    kept_i = _span(lons, (middle - (east - west) / 2, middle + (east - west) / 2), margin)
-    kept_j = _span(lats, lat, margin)
+    kept = cut.grid.cut(file.name, lon, lat, frame.lon, margin)
+    kept_i, kept_j = slice(int(kept.columns[0]), int(kept.columns[-1]) + 1), kept.rows
     count = file.u[during].shape[0]
-    values = np.empty((count, depths.size, kept_i.stop - kept_i.start, kept_j.stop - kept_j.start, 2))
-    wet = np.ones((file.depth.size, lons.size, lats.size), dtype=bool)
+    values = np.empty((count, depths.size, kept.grid.shape[1], kept.grid.shape[0], 2))
+    wet = np.ones((file.depth.size, *lons.shape), dtype=bool)
     for n in range(count):
-        here = np.s_[during.start + n, :, rows, :]
-        east_north = [part[here][..., which].transpose(0, 2, 1).astype(np.float64) for part in (file.u, file.v)]
+        here = np.s_[during.start + n, :, cut.rows, :]
+        east_north = [
+            part[here][..., cut.columns].transpose(0, 2, 1).astype(np.float64) for part in (file.u, file.v)
+        ]
         wet &= np.isfinite(east_north[0])
         u, v = (part[levels] for part in east_north)
         turned = np.stack([u * cos - v * sin, u * sin + v * cos], axis=-1)
         values[n] = filled(turned)[::-1, kept_i, kept_j]
-    wet = wet[:, kept_i, kept_j]
-    lons, lats = lons[kept_i], lats[kept_j]
     faces = np.array([np.inf]) if file.surface else lower_faces(file.depth)
-    at_centre = np.radians([np.diff(lons).min() * np.cos(np.radians(sum(lat) / 2)), np.diff(lats).min()])
+    bottom = bottoms(wet[:, kept_i, kept_j], faces)
+    if file.seabed is not None:
+        # the model's own depth: levels of fixed depth only cut it into steps
+        own = -file.seabed[cut.rows][:, cut.columns].T[kept_i, kept_j]
+        bottom = np.where(bottom < 0, np.minimum(own, 0.0), 0.0)
+    along, across = kept.grid.cell_sizes()
     return _assemble(
         values,
         -depths[::-1],
         seconds,
-        index_map(frame, lons, lats),
-        bottoms(wet, faces),
-        float(at_centre.min()) * EARTH,
+        index_map(frame, kept.grid),
+        bottom,
+        float(min(along.min(), across.min())),
         clearance,
     )
 
@@ -419,11 +247,10 @@ def sample(
         during = slice(first, first + (1 if file.times[first] == when else 2))
         # a gap at another time is no reason to have no answer at this one
         file = replace(file, times=file.times[during], u=file.u[during], v=file.v[during])
-    _, lons = columns(file.lon, lon)
-    slack_lon, slack_lat = EDGE * np.diff(lons).max(initial=0), EDGE * np.diff(file.lat).max(initial=0)
-    at_lon, at_lat = float(np.clip(lon, lons[0], lons[-1])), float(np.clip(lat, file.lat[0], file.lat[-1]))
-    if abs(at_lon - lon) > slack_lon or abs(at_lat - lat) > slack_lat:
+    place = file.grid.nearest_place(lon, lat)
+    if place is None:
         return None
+    at_lon, at_lat = place
     if not file.surface:
         if depth > file.depth[-1] + DEPTH_SLACK:
             return None

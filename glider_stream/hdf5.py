@@ -1,0 +1,38 @@
+"""Untrusted HDF5 files: what may not be followed, before anything is read."""
+
+from pathlib import Path
+
+import h5py
+
+from .settings import require
+
+MOST_OBJECTS = 10_000
+"""No current file and no roadmap holds as many groups and datasets."""
+
+
+def check_links(path: str | Path) -> None:
+    """InputError where a file leads out of itself: external links, external or virtual datasets.
+
+    OSError or RuntimeError, as h5py has them, where it is damaged.
+    """
+    seen: set[object] = set()
+    with h5py.File(path, "r") as file:
+        waiting: list[h5py.Group] = [file]
+        while waiting:
+            group = waiting.pop()
+            for name in group:
+                link = group.get(name, getlink=True)
+                within = not isinstance(link, h5py.ExternalLink)
+                require(within, f"{path} links to another file at `{name}`, which is not followed: copy it in")
+                if isinstance(link, h5py.SoftLink):
+                    continue
+                one = group.get(name)
+                if one is None or one.id in seen:
+                    continue
+                seen.add(one.id)
+                require(len(seen) <= MOST_OBJECTS, f"{path} holds more than {MOST_OBJECTS:,} objects; cut it")
+                if isinstance(one, h5py.Group):
+                    waiting.append(one)
+                elif isinstance(one, h5py.Dataset):
+                    own = not one.external and not one.is_virtual
+                    require(own, f"the data of `{name}` in {path} lie in other files, not followed: copy them in")

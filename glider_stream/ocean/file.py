@@ -1,0 +1,59 @@
+"""An ocean file, all conventions resolved."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .grid import Grid
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Times = NDArray[np.datetime64]
+
+
+@dataclass(frozen=True)
+class OceanFile:
+    """Currents as a file holds them: `u` east, `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data.
+
+    `grid` (ny, nx); `depth` (nz) rises downward [m]; `times` (nt) UTC, or None if unknown; `wet` (nz, ny, nx)
+    where there is data at every time. `surface`: the file names no depth, `depth` is [0]. `seabed` (ny, nx)
+    [m, downward] where the model says it. `took` says what was taken for what; `notes` what else to know.
+    """
+
+    name: str
+    grid: Grid
+    depth: Array
+    times: Times | None
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    wet: Bools
+    surface: bool
+    took: dict[str, str]
+    notes: tuple[str, ...] = ()
+    seabed: Array | None = None
+
+    @property
+    def steady(self) -> bool:
+        """Whether it holds a single time."""
+        return self.times is None or self.times.size == 1
+
+    @property
+    def time_range(self) -> str:
+        """First and last time, for people."""
+        if self.times is None:
+            return "no time"
+        return " to ".join(f"{t}Z" for t in np.unique(self.times[[0, -1]]).astype("datetime64[s]"))
+
+
+def parse_time(text: str, what: str) -> np.datetime64:
+    """An ISO 8601 text as UTC; without a zone it is UTC."""
+    try:
+        when = datetime.fromisoformat(text.strip())
+    except (ValueError, AttributeError):
+        raise InputError(f"{what} must be a time such as 2024-11-20T12:00:00; got {text!r}") from None
+    if when.tzinfo is not None:
+        when = when.astimezone(UTC).replace(tzinfo=None)
+    return np.datetime64(when, "ms")

@@ -1,0 +1,339 @@
+"""Horizontal grids of ocean files: regular in longitude and latitude, or curved."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from ..frame import LocalFrame, Range, eastward, wrapped
+from ..settings import require
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+EARTH = 6_371_000.0
+EDGE = 0.01
+"""A point is on the grid up to this far beyond its ends, in cells: degrees come rounded."""
+EVEN = 1e-3
+"""An axis this close to even, in cells, is even: the rest is the rounding of its degrees."""
+MAP_ERROR = 1.0
+"""The index map misplaces no point of the grid by more than this [m] ..."""
+MAP_SIDE = 1025
+"""... unless it grows beyond this many points on a side; then a hundredth of a cell must do."""
+NEWTON_STEPS = 12
+"""Newton's steps to invert a cell; three do where cells are alike."""
+SETTLED = 1e-10
+"""A step of Newton's this small is the last, in cells."""
+
+
+def unit_vectors(lon: Array, lat: Array) -> Array:
+    """Places on the unit sphere, (..., 3): there longitudes have no seam."""
+    phi, lam = np.radians(lat), np.radians(lon)
+    return np.stack([np.cos(phi) * np.cos(lam), np.cos(phi) * np.sin(lam), np.sin(phi)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A part of a grid: its rows, its columns (in the order of the part), and the part itself."""
+
+    rows: slice
+    columns: Index
+    grid: "Grid"
+
+
+@dataclass(frozen=True)
+class LonLatGrid:
+    """`lon` (nx) rises eastward, `lat` (ny) northward [degrees]."""
+
+    lon: Array
+    lat: Array
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.lat.size, self.lon.size
+
+    @property
+    def bounds(self) -> tuple[Range, Range]:
+        """West and east, south and north [degrees]."""
+        return (float(self.lon[0]), float(self.lon[-1])), (float(self.lat[0]), float(self.lat[-1]))
+
+    def mesh(self) -> tuple[Array, Array]:
+        """Longitude and latitude of each point (ny, nx) [degrees]."""
+        lon, lat = np.meshgrid(self.lon, self.lat)
+        return lon, lat
+
+    def rim(self) -> tuple[Array, Array]:
+        """Places along the edge, close together [degrees]."""
+        share = np.linspace(0, 1, 65)
+        lon = self.lon[0] + share * (self.lon[-1] - self.lon[0])
+        lat = self.lat[0] + share * (self.lat[-1] - self.lat[0])
+        west, east = (np.full(65, edge) for edge in self.lon[[0, -1]])
+        south, north = (np.full(65, edge) for edge in self.lat[[0, -1]])
+        return np.concatenate([lon, lon, west, east]), np.concatenate([south, north, lat, lat])
+
+    def cell_sizes(self) -> tuple[Array, Array]:
+        """Sizes of cells along a row and across rows [m]: the largest along each axis."""
+        widest = np.cos(np.radians(np.abs(self.lat).min()))
+        return (
+            np.radians(np.diff(self.lon)) * widest * EARTH,
+            np.radians(np.diff(self.lat)) * EARTH,
+        )
+
+    def nearest_place(self, lon: float, lat: float) -> tuple[float, float] | None:
+        """The place itself, or the next one on the grid if rounding put it beside; None where there is none."""
+        _, lons = columns(self.lon, lon)
+        slack_lon, slack_lat = EDGE * np.diff(lons).max(initial=0), EDGE * np.diff(self.lat).max(initial=0)
+        at_lon, at_lat = float(np.clip(lon, lons[0], lons[-1])), float(np.clip(lat, self.lat[0], self.lat[-1]))
+        off = abs(at_lon - lon) > slack_lon or abs(at_lat - lat) > slack_lat
+        return None if off else (at_lon, at_lat)
+
+    def cut(self, name: str, lon: Range, lat: Range, centre: float, margin: int) -> Cut:
+        """The part that a domain [degrees] needs, with a margin of cells; InputError where it lies outside."""
+        which, lons = columns(self.lon, centre)
+        west, east = eastward(lon)
+        middle = float(wrapped((west + east) / 2, centre))
+        half = (east - west) / 2
+        lon = (middle - half, middle + half)
+        for what, axis, bounds in (("longitude", lons, lon), ("latitude", self.lat, lat)):
+            require(bounds[0] <= bounds[1], f"the domain's {what} must rise; got {bounds[0]:g} to {bounds[1]:g}")
+            slack = EDGE * np.diff(axis).max() if axis.size > 1 else 0.0
+            require(
+                axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack,
+                f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
+                f"which holds {axis[0]:.6g} to {axis[-1]:.6g}",
+            )
+        across, rows = span(lons, lon, margin), span(self.lat, lat, margin)
+        return Cut(rows, which[across], LonLatGrid(lons[across], self.lat[rows]))
+
+    def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:
+        """Fractional indices (column, row) of places in a frame [m], (..., 2); straight on beyond the ends."""
+        lon, lat = frame.to_lonlat(x, y)
+        return np.stack([_fraction(self.lon, lon), _fraction(self.lat, lat)], axis=-1)
+
+
+@dataclass(frozen=True)
+class CurvedGrid:
+    """`lon`, `lat` (ny, nx) [degrees] of each point; neighbours in the file are neighbours in the sea."""
+
+    lon: Array
+    lat: Array
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.lon.shape[0], self.lon.shape[1]
+
+    @property
+    def bounds(self) -> tuple[Range, Range]:
+        """West and east, south and north [degrees], of the smallest arc that holds all."""
+        lon = np.sort(self.lon.ravel() % 360)
+        gaps = np.append(np.diff(lon), lon[0] + 360 - lon[-1])
+        widest = int(gaps.argmax())
+        west = float(wrapped(lon[(widest + 1) % lon.size], 0.0))
+        return (west, west + 360 - float(gaps[widest])), (float(self.lat.min()), float(self.lat.max()))
+
+    def mesh(self) -> tuple[Array, Array]:
+        """As LonLatGrid says."""
+        return self.lon, self.lat
+
+    def rim(self) -> tuple[Array, Array]:
+        """As LonLatGrid says."""
+        edge = (np.s_[0, :], np.s_[-1, :], np.s_[:, 0], np.s_[:, -1])
+        return np.concatenate([self.lon[e] for e in edge]), np.concatenate([self.lat[e] for e in edge])
+
+    def cell_sizes(self) -> tuple[Array, Array]:
+        """As LonLatGrid says."""
+        at = self._vectors
+        return (
+            EARTH * np.linalg.norm(np.diff(at, axis=1), axis=-1).ravel(),
+            EARTH * np.linalg.norm(np.diff(at, axis=0), axis=-1).ravel(),
+        )
+
+    @cached_property
+    def _vectors(self) -> Array:
+        return unit_vectors(self.lon, self.lat)
+
+    def nearest_place(self, lon: float, lat: float) -> tuple[float, float] | None:
+        """As LonLatGrid says."""
+        near = self._box(np.array([lon]), np.array([lat]), 3)
+        part = CurvedGrid(self.lon[near], self.lat[near])
+        frame = LocalFrame(lon, lat)
+        at = part.indices(frame, np.zeros(1), np.zeros(1))[0]
+        last = np.array(part.shape[::-1]) - 1.0
+        inside = bool((at >= -EDGE).all() and (at <= last + EDGE).all())
+        # a part's edge within the grid lies three cells away
+        return (lon, lat) if inside else None
+
+    def _box(self, lon: Array, lat: Array, margin: int) -> tuple[slice, slice]:
+        """The rows and columns about the points nearest to some places."""
+        tree = KDTree(self._vectors.reshape(-1, 3))
+        nearest = np.asarray(tree.query(unit_vectors(lon, lat))[1])
+        j, i = np.unravel_index(nearest, self.shape)
+        return tuple(slice(max(0, int(at.min()) - margin), int(at.max()) + margin + 1) for at in (j, i))  # type: ignore[return-value]
+
+    def cut(self, name: str, lon: Range, lat: Range, centre: float, margin: int) -> Cut:
+        """As LonLatGrid says; columns are not joined across a seam of the file."""
+        west, east = eastward(lon)
+        require(lat[0] <= lat[1], f"the domain's latitude must rise; got {lat[0]:g} to {lat[1]:g}")
+        at_lon, at_lat = np.meshgrid(np.linspace(west, east, 33), np.linspace(*lat, 33))
+        rows, across = self._box(at_lon.ravel(), at_lat.ravel(), margin + 1)
+        part = CurvedGrid(self.lon[rows, across], self.lat[rows, across])
+        frame = LocalFrame.over(lon, lat)
+        at = part.indices(frame, *frame.to_local(at_lon, at_lat)).reshape(-1, 2)
+        last = np.array(part.shape[::-1]) - 1.0
+        inside = bool((at >= -EDGE).all() and (at <= last + EDGE).all())
+        own_lon, own_lat = self.bounds
+        require(
+            inside,
+            f"the domain, longitude {lon[0]:g} to {lon[1]:g} and latitude {lat[0]:g} to {lat[1]:g}, lies partly "
+            f"outside {name} or across its seam; it holds longitude {own_lon[0]:.6g} to {own_lon[1]:.6g}, "
+            f"latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows",
+        )
+        return Cut(rows, np.arange(self.shape[1])[across], part)
+
+    def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:
+        """As LonLatGrid says: the inverse of the bilinear map of the cell, by Newton's method."""
+        shape = np.shape(x)
+        to = np.stack([np.ravel(x), np.ravel(y)], axis=-1)
+        at = np.stack(frame.to_local(self.lon, self.lat), axis=-1)
+        last_j, last_i = (n - 2 for n in self.shape)
+        nearest = np.asarray(KDTree(at.reshape(-1, 2)).query(to)[1])
+        j, i = (part.astype(np.float64) for part in np.unravel_index(nearest, self.shape))
+        for _ in range(NEWTON_STEPS):
+            cell_j = np.clip(np.floor(j), 0, last_j).astype(np.intp)
+            cell_i = np.clip(np.floor(i), 0, last_i).astype(np.intp)
+            # beyond the rim the cell is held straight: its twist would fold far away
+            b, a = np.clip(j - cell_j, 0, 1)[:, None], np.clip(i - cell_i, 0, 1)[:, None]
+            p00, p10 = at[cell_j, cell_i], at[cell_j + 1, cell_i]
+            p01, p11 = at[cell_j, cell_i + 1], at[cell_j + 1, cell_i + 1]
+            along = (p01 - p00) * (1 - b) + (p11 - p10) * b
+            across = (p10 - p00) * (1 - a) + (p11 - p01) * a
+            here = p00 * (1 - a) * (1 - b) + p01 * a * (1 - b) + p10 * (1 - a) * b + p11 * a * b
+            here += along * ((i - cell_i)[:, None] - a) + across * ((j - cell_j)[:, None] - b)
+            off = to - here
+            area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+            area = np.where(np.abs(area) > 0, area, np.inf)  # a cell without area moves nothing
+            step_i = (off[:, 0] * across[:, 1] - off[:, 1] * across[:, 0]) / area
+            step_j = (off[:, 1] * along[:, 0] - off[:, 0] * along[:, 1]) / area
+            i, j = i + step_i, j + step_j
+            if max(np.abs(step_i).max(initial=0), np.abs(step_j).max(initial=0)) < SETTLED:
+                break
+        return np.stack([i, j], axis=-1).reshape(*shape, 2)
+
+
+Grid = LonLatGrid | CurvedGrid
+
+
+def grid_of(lon: Array, lat: Array) -> Grid:
+    """The grid of axes (nx), (ny), or of places (ny, nx): regular where these are no more than axes."""
+    if lon.ndim == 1:
+        return LonLatGrid(lon, lat)
+    if min(lon.shape) < 2:
+        return CurvedGrid(lon, lat)
+    first = wrapped(lon[0], float(lon[0, lon.shape[1] // 2]))
+    step = max(float(np.abs(np.diff(first)).min()), 1e-9), max(float(np.abs(np.diff(lat[:, 0])).min()), 1e-9)
+    off_lon = np.abs(wrapped(lon - lon[0], 0.0)).max() / step[0]
+    off_lat = np.abs(lat - lat[:, :1]).max() / step[1]
+    rising = bool((np.diff(first) > 0).all() and (np.diff(lat[:, 0]) > 0).all())
+    if max(off_lon, off_lat) < EVEN and rising:
+        return LonLatGrid(first, np.ascontiguousarray(lat[:, 0]))
+    return CurvedGrid(lon, lat)
+
+
+def columns(lon: Array, centre: float) -> tuple[Index, Array]:
+    """Indices and longitudes of the unbroken run of columns about `centre`, west to east, modulo 360.
+
+    Longitudes are within 180 degrees of the centre; a file that circles the globe has no seam there.
+    """
+    turned = wrapped(lon, centre)
+    order = np.argsort(turned, kind="stable")
+    turned = turned[order]
+    breaks = np.flatnonzero(np.diff(turned) > 1.5 * np.diff(lon).max()) + 1
+    runs = np.split(np.arange(lon.size), breaks)
+    run = max(runs, key=lambda r: (bool(turned[r[0]] <= centre <= turned[r[-1]]), r.size))
+    return order[run], turned[run]
+
+
+def span(axis: Array, bounds: Range, margin: int) -> slice:
+    """Two points or more: the cells that hold the bounds, and a margin where there is one."""
+    first = max(0, min(int(np.searchsorted(axis, bounds[0], side="right")) - 1, axis.size - 2))
+    last = max(first + 1, min(int(np.searchsorted(axis, bounds[1], side="left")), axis.size - 1))
+    return slice(max(0, first - margin), min(axis.size, last + margin + 1))
+
+
+def _fraction(axis: Array, at: Array) -> Array:
+    """Fractional index of values on a rising axis, straight on beyond its ends."""
+    even = np.linspace(axis[0], axis[-1], axis.size)
+    step = (axis[-1] - axis[0]) / (axis.size - 1)
+    if np.abs(axis - even).max() <= EVEN * step:
+        return np.asarray((at - axis[0]) / step)
+    below = np.clip(np.searchsorted(axis, at, side="right") - 1, 0, axis.size - 2)
+    return np.asarray(below + (at - axis[below]) / (axis[below + 1] - axis[below]))
+
+
+@dataclass(frozen=True)
+class IndexMap:
+    """The file's fractional indices at even points of the frame, as `OceanGrid` describes them.
+
+    `error` [m]: how far reading between the points misplaces a point of the grid, at worst.
+    """
+
+    index_map: Array
+    per_x: float
+    per_y: float
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    error: float
+
+
+def index_map(frame: LocalFrame, grid: Grid) -> IndexMap:
+    """The map of a grid, as fine as MAP_ERROR asks."""
+    x, y = frame.to_local(*grid.rim())
+    # the rim bulges a little between the points above
+    pad_x, pad_y = 0.01 * np.ptp(x), 0.01 * np.ptp(y)
+    x_lo, x_hi, y_lo, y_hi = x.min() - pad_x, x.max() + pad_x, y.min() - pad_y, y.max() + pad_y
+    along, across = grid.cell_sizes()
+    cells = np.array([along.max(), across.max()])
+    last = np.array(grid.shape[::-1]) - 1.0
+
+    def indices(side: int, shift_x: float, shift_y: float) -> Array:
+        px = x_lo + (np.arange(side) + shift_x) * (x_hi - x_lo) / (side - 1)
+        py = y_lo + (np.arange(side) + shift_y) * (y_hi - y_lo) / (side - 1)
+        return grid.indices(frame, *np.meshgrid(px, py, indexing="ij"))
+
+    side = 9
+    while True:
+        known, error = indices(side, 0, 0), 0.0
+        between_x = (known[1:, :] + known[:-1, :]) / 2
+        between_y = (known[:, 1:] + known[:, :-1]) / 2
+        for read, shift in (
+            (between_x, (0.5, 0.0)),
+            (between_y, (0.0, 0.5)),
+            ((between_x[:, 1:] + between_x[:, :-1]) / 2, (0.5, 0.5)),
+        ):
+            exact = indices(side, *shift)[: read.shape[0], : read.shape[1]]
+            inside = ((exact >= 0) & (exact <= last)).all(axis=-1)
+            off = np.hypot(*np.moveaxis((read - exact) * cells, -1, 0))
+            error = max(error, float(off[inside].max(initial=0)))
+        if error <= MAP_ERROR or side >= MAP_SIDE:
+            break
+        side = 2 * side - 1
+    require(
+        error <= max(MAP_ERROR, 0.01 * cells.min()),
+        f"the grid is too uneven or too near a pole for a flat frame: points would be read {error:.0f} m off",
+    )
+    return IndexMap(
+        np.ascontiguousarray(known),
+        (side - 1) / (x_hi - x_lo),
+        (side - 1) / (y_hi - y_lo),
+        float(x_lo),
+        float(x_hi),
+        float(y_lo),
+        float(y_hi),
+        error,
+    )

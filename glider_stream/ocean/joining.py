@@ -1,0 +1,183 @@
+"""The parts of one or several files made one: u and v on one grid, toward true east and north."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from ..errors import InputError
+from ..settings import require
+from .file import OceanFile
+from .grid import Grid, grid_of, unit_vectors
+from .land import mark_land
+from .names import WORDS, Names
+from .part import Field, Part
+from .stagger import AGREES, collocated, half_a_cell_on, row_angle, same_points, turned
+
+Array = NDArray[np.float64]
+Values = NDArray[np.float32]
+LITTLE = math.radians(0.1)
+"""A grid turned by less [rad] reads the same either way: 0.5 mm/s in 0.3 m/s."""
+
+
+def _same(a: NDArray[Any] | None, b: NDArray[Any] | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    if a.shape != b.shape:
+        return False
+    if a.dtype.kind == "M":
+        return bool((a == b).all())
+    return bool(np.allclose(a, b, rtol=0, atol=1e-3 * float(np.diff(a).min(initial=1.0))))
+
+
+def _stacked(name: str, parts: list[Part]) -> Part:
+    """The parts of one component, one after the other in time."""
+    first = parts[0]
+    for part in parts[1:]:
+        same = _same(part.depth, first.depth) and same_points(part.grid.mesh(), first.grid.mesh())
+        require(
+            same,
+            f"{name}: the currents are on different points ({_extent(first.grid)}, and {_extent(part.grid)}); "
+            "bring them onto one grid first",
+        )
+    if len(parts) == 1:
+        return first
+    known = [part.times for part in parts if part.times is not None]
+    require(len(known) == len(parts), f"{name}: of several files, each must say its time; at least one does not")
+    times, values = np.concatenate(known), np.concatenate([part.values for part in parts])
+    rank = np.argsort(times, kind="stable")
+    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
+    return replace(first, times=times[rank], values=values[rank], notes=notes)
+
+
+def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
+    """One set of currents out of the parts: in the order of time, u and v on one grid, east and north."""
+    name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
+    both = []
+    for component, toward in (("u", "east"), ("v", "north")):
+        own = [part for part in parts if part.component == component]
+        require(len(own) > 0, f"{name} holds no current toward {toward}; name the file that does, too")
+        both.append(_stacked(name, own))
+    east, north = both
+    require(_same(east.times, north.times), f"{name}: east and north currents are given at different times")
+    moments = east.times
+    if moments is not None and moments.size > 1:
+        again = moments[1:][np.diff(moments) <= np.timedelta64(0, "ms")]
+        require(again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap")
+    depth = _depths_of_both(name, east, north)
+    grid, u, v, staggered = _on_one_grid(name, east, north, said)
+    notes = list(dict.fromkeys(note for part in both for note in part.notes))
+    if staggered:
+        notes.append("u and v lie on points of their own (a C-grid): brought to the cells' centres")
+    u, v, more = _toward_east(name, grid, east, north, u, v, staggered)
+    notes += more
+
+    missing = np.isnan(u) | np.isnan(v)
+    fills = bool(missing.any())
+    u[missing] = v[missing] = np.nan
+    notes += mark_land(u, v, fills)
+    data = np.isfinite(u)
+    wet, ever = np.asarray(data.all(axis=0)), np.asarray(data.any(axis=0))
+    require(bool(ever.any()), f"{name} holds no current at all: every value is missing or zero")
+    if (gaps := int((ever & ~wet).sum())) > 0:
+        notes.append(
+            f"{100 * gaps / ever.sum():.1f} % of the wet points have gaps in time; plans keep out of these"
+        )
+    if depth is None:
+        notes.append("the file names no depth: its current is taken as the surface's and held at all depths")
+    if moments is None or moments.size == 1:
+        notes.append("a single time: the current is taken as steady")
+    merged = {key: what for part in (north, east) for key, what in part.took.items()}
+    took = {key: merged[key] for key in ("u", "v", *WORDS) if key in merged}
+    seabed = east.fields.get("seabed")
+    floor = None if seabed is None else _seabed_at(seabed, north.fields.get("seabed"), grid)
+    levels = np.zeros(1) if depth is None else depth
+    return OceanFile(name, grid, levels, moments, u, v, wet, depth is None, took, tuple(notes), floor)
+
+
+def _depths_of_both(name: str, east: Part, north: Part) -> Array | None:
+    """The levels of both components; of terrain-following ones, u's: v is read on the same where they differ."""
+    if _same(east.depth, north.depth):
+        return east.depth
+    raise InputError(f"{name}: the currents are given at different depths; bring them onto the same levels first")
+
+
+def _on_one_grid(name: str, east: Part, north: Part, said: Names) -> tuple[Grid, Values, Values, bool]:
+    """u and v at the same points; whether they were brought there."""
+    u_at, v_at = east.grid.mesh(), north.grid.mesh()
+    if said.stagger == "nemo":
+        require(east.grid.shape == north.grid.shape, f"{name}: u and v differ in shape; `stagger` cannot be nemo")
+        lon, lat, u, v = half_a_cell_on(u_at, east.values, north.values)
+        return grid_of(lon, lat), u, v, True
+    if same_points(u_at, v_at):
+        apart = {"depthu", "depthv"} <= {east.levels_name.lower(), north.levels_name.lower()}
+        if apart and said.stagger is None:
+            raise InputError(
+                f"`{east.variable}`, `{north.variable}` of {name} are of a staggered grid (depthu, depthv), "
+                'but at the same longitudes: name `stagger` in `names`, "nemo" if these are the cells\' centres, '
+                '"none" if both were brought there'
+            )
+        return east.grid, east.values, north.values, False
+    lon, lat, u, v = collocated(name, u_at, v_at, east.values, north.values)
+    return grid_of(lon, lat), u, v, True
+
+
+def _toward_east(
+    name: str, grid: Grid, east: Part, north: Part, u: Values, v: Values, staggered: bool
+) -> tuple[Values, Values, list[str]]:
+    """The components turned, where they run along a grid that is; refused where that is not said."""
+    ways = {east.way, north.way}
+    lon, lat = grid.mesh()
+    along = staggered or "grid" in ways
+    if ways == {"east"} and not staggered:
+        return u, v, []
+    angle = row_angle(name, lon, lat, east.signs) if along or "unsure" in ways else np.zeros(lon.shape)
+    field = east.fields.get("angle") or north.fields.get("angle")
+    told = None if field is None else field.at(lon, lat)
+    if told is not None and field is not None:
+        # the angle of land is often a zero, and no matter
+        off = np.abs(np.angle(np.exp(1j * (told - angle))))[np.isfinite(u).any(axis=(0, 1))]
+        require(
+            off.size == 0 or float(np.quantile(off, 0.95)) < AGREES,
+            f"`{field.name}` of {name} is not the angle from east to the grid's rows, which lie up to "
+            f"{math.degrees(float(off.max(initial=0))):.0f} degrees elsewhere: name `rotate` in `names`, "
+            '"grid" to follow the rows',
+        )
+        angle = told
+    most = float(np.abs(angle).max())
+    if most < LITTLE:
+        return u, v, []
+    if ways == {"east"} or ("unsure" in ways and not along and told is None):
+        raise InputError(
+            f"`{east.variable}` and `{north.variable}` of {name} do not say whether they run toward east and "
+            f"north or along the grid's rows, which leave east by up to {math.degrees(most):.0f} degrees: "
+            'name `rotate` in `names`, "none" or "grid"'
+        )
+    by = "the grid's own geometry" if told is None or field is None else f"`{field.name}`"
+    u, v = turned(u, v, angle)
+    return u, v, [f"turned to true east and north by {by}, by up to {math.degrees(most):.1f} degrees"]
+
+
+def _seabed_at(first: Field, second: Field | None, grid: Grid) -> Array:
+    """The model's own depth at the grid's points: the mean of what the components next to it have."""
+    lon, lat = grid.mesh()
+    found = []
+    for field in (first, second):
+        if field is None:
+            continue
+        tree = KDTree(unit_vectors(field.lon, field.lat))
+        off, near = map(np.asarray, tree.query(unit_vectors(lon, lat).reshape(-1, 3), k=2))
+        # the point itself, or the two that it lies between
+        own = off[:, 0] < 0.1 * off[:, 1]
+        value = np.where(own, field.values[near[:, 0]], field.values[near].mean(axis=1))
+        found.append(value.reshape(lon.shape))
+    return np.asarray(np.nanmean(found, axis=0))
+
+
+def _extent(grid: Grid) -> str:
+    (west, east), (south, north) = grid.bounds
+    return f"lon {west:.6g} to {east:.6g}, lat {south:.6g} to {north:.6g}"

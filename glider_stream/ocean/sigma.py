@@ -1,0 +1,146 @@
+"""Terrain-following levels: the depth of each, and values on levels of fixed depth."""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..settings import require
+from .names import SIGMA, listing, standard_name
+
+Array = NDArray[np.float64]
+Values = NDArray[np.float32]
+FINER = 2
+"""Levels of fixed depth for each terrain-following one: interpolating twice must not blur."""
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class SigmaLevels:
+    """Heights z(s) [m, upward] of levels over a seabed at depth h under a surface at zeta.
+
+    The three forms of CF Appendix D. `stretch` C and `at` s (levels): ocean_s_coordinate_g1:
+    S = hc s + (h - hc) C, z = S + zeta (1 + S / h). _g2: S = (hc s + h C) / (hc + h), z = zeta + (zeta + h) S.
+    ocean_sigma_coordinate: z = zeta + s (zeta + h).
+    """
+
+    form: str
+    dim: str
+    at: Array
+    stretch: Array
+    critical: float
+    depth: Any
+    surface: Any | None
+    words: str
+
+    def heights(self, h: Array, zeta: Array | float) -> Array:
+        """Heights of all levels over points of depth `h` (ny, nx): (levels, ny, nx)."""
+        s, c = self.at[:, None, None], self.stretch[:, None, None]
+        if self.form == "sigma":
+            return np.asarray(zeta + s * (zeta + h))
+        if self.form == "g1":
+            S = self.critical * s + (h - self.critical) * c
+            return np.asarray(S + zeta * (1 + S / h))
+        S = (self.critical * s + h * c) / (self.critical + h)
+        return np.asarray(zeta + (zeta + h) * S)
+
+
+def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
+    """What a file says of the terrain-following levels of a variable; InputError names what is missing."""
+    coordinate = next(
+        (
+            data[n]
+            for n in map(str, data.variables)
+            if data[n].dims == (dim,) and SIGMA.match(standard_name(data[n]))
+        ),
+        None,
+    )
+    coordinate = data[dim] if coordinate is None and dim in data.variables else coordinate
+    broken = f"`{variable.name}` in {name} is on terrain-following levels `{dim}`"
+    if coordinate is None:
+        raise InputError(f"{broken} without values of its own; add the file that holds them")
+    terms = dict(re.findall(r"(\w+)\s*:\s*(\S+)", str(coordinate.attrs.get("formula_terms", ""))))
+
+    def term(key: str, *usual: str) -> Any | None:
+        names = [terms[key]] if key in terms else []
+        return next((data[n] for n in (*names, *usual) if n in data.variables), None)
+
+    def number(key: str, *usual: str) -> float | None:
+        one = term(key, *usual)
+        if one is not None and one.size == 1:
+            return float(one.values.ravel()[0])
+        said = next((data.attrs[n] for n in usual if n in data.attrs), None)
+        return None if said is None else float(np.ravel(said)[0])
+
+    standard = standard_name(coordinate)
+    h, zeta = term("depth", "h", "bathy", "depth"), term("eta", "zeta", "ssh", "zos")
+    if h is None or h.ndim < 2:
+        raise InputError(f"{broken}, but the file holds no depth of the seabed `h`; add the grid file that does")
+    s = np.asarray(coordinate.values, np.float64)
+    require(bool(((s >= -1 - SAME) & (s <= SAME)).all()), f"{broken}, whose values do not lie in -1 to 0")
+    words = f"{dim}: terrain-following levels over `{h.name}`"
+    words += " under a level surface" if zeta is None else f" under `{zeta.name}`"
+    if standard == "ocean_sigma_coordinate":
+        return SigmaLevels("sigma", dim, s, s, 0.0, h, zeta, words)
+    transform = number("", "Vtransform", "vtransform", "VertCoordType")
+    if standard not in ("ocean_s_coordinate_g1", "ocean_s_coordinate_g2"):
+        if standard and standard != "ocean_s_coordinate":
+            raise InputError(
+                f"{broken} of the form {standard!r}, which is not known: interpolate to fixed depths"
+            )
+        if transform not in (1.0, 2.0):
+            raise InputError(f"{broken}, but the file has no `Vtransform` of 1 or 2; add the grid file that does")
+        standard = f"ocean_s_coordinate_g{int(transform)}"
+    stretch, critical = term("C", "Cs_r", "Cs_rho"), number("depth_c", "hc", "Tcline")
+    lacks = [what for what, one in (("Cs_r", stretch), ("hc", critical)) if one is None]
+    require(not lacks, f"{broken}, but the file holds no {listing(lacks)}; add the grid file that does")
+    assert stretch is not None
+    assert critical is not None
+    c = np.asarray(stretch.values, np.float64)
+    require(c.shape == s.shape, f"{broken}, but `{stretch.name}` has {c.size} values for {s.size} levels")
+    return SigmaLevels(standard[-2:], dim, s, c, critical, h, zeta, words)
+
+
+def fixed_depths(levels: SigmaLevels, h: Array) -> Array:
+    """Depths [m, downward, rising] that stand for the levels: as theirs over the deepest point, made finer."""
+    known = np.isfinite(h) & (h > 0)
+    require(bool(known.any()), f"the depth of the seabed `{levels.depth.name}` is nowhere above 0")
+    parts = []
+    for deep in np.unique(np.quantile(h[known], [0.02, 0.5, 1.0])):
+        own = np.sort(-levels.heights(np.full((1, 1), deep), 0.0).ravel())
+        edges = np.concatenate([[0.0], np.clip(own, 0.0, deep), [deep]])
+        parts.append(np.interp(np.linspace(0, 1, FINER * edges.size), np.linspace(0, 1, edges.size), edges))
+    every = np.unique(np.concatenate(parts))
+    # levels closer than a hundredth of their depth, or 10 cm, say the same
+    kept = [every[0]]
+    for depth in every[1:]:
+        if depth - kept[-1] >= max(0.1, 0.01 * depth):
+            kept.append(depth)
+    kept[-1] = every[-1] if every[-1] > kept[-1] - 0.1 and len(kept) > 1 else kept[-1]
+    return np.array(kept)
+
+
+def to_fixed(values: Values, heights: Array, h: Array, depths: Array) -> Values:
+    """Values (levels, ny, nx) at `heights` [m] on fixed `depths` (nz, ny, nx): linear between levels.
+
+    Held above the highest and below the lowest level; NaN under the seabed at `h`.
+    """
+    order = (
+        slice(None) if heights.shape[0] < 2 or np.nanmean(np.diff(heights, axis=0)) > 0 else slice(None, None, -1)
+    )
+    at, known = heights[order], values[order]
+    count = at.shape[0]
+    result = np.empty((depths.size, *h.shape), np.float32)
+    for k, depth in enumerate(depths):
+        z = -depth
+        below = np.clip((at <= z).sum(axis=0) - 1, 0, max(count - 2, 0))[None]
+        above = np.minimum(below + 1, count - 1)
+        lower, upper = (np.take_along_axis(at, n, axis=0)[0] for n in (below, above))
+        low, high = (np.take_along_axis(known, n, axis=0)[0] for n in (below, above))
+        gap = upper - lower
+        weight = np.clip((z - lower) / np.where(gap > 0, gap, 1.0), 0.0, 1.0)
+        result[k] = np.where(depth <= h + SAME, low * (1 - weight) + high * weight, np.nan)
+    return result
