@@ -25,7 +25,7 @@ from .kernels.cache import KERNEL_DIGEST, entry_point
 from .kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
 from .kernels.motion import LANES, X, Y
 from .query import Planner
-from .roadmap import find_edges, node_positions
+from .roadmap import find_edges, node_positions, warm_up
 from .scenario import read_scenario, scenario_from_text, to_toml
 from .settings import require
 from .store import read_roadmap, replacing
@@ -220,8 +220,11 @@ def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
 def _rate(overrides: Sequence[str], shape: str, count: int | None = None) -> float:
     """Pairs per second of a build of the seed box with so many nodes, on `count` threads, all if None."""
     problem = read_scenario("seed-box", [*overrides, f"sampling.shape={shape}"]).problem()
-    tally = find_edges(problem, node_positions(problem), lambda edges: None, count)
-    return sum(tally.counts.values()) / tally.wall_s
+    position = node_positions(problem)
+    with threads(count):
+        warm_up(problem)
+        done = [(edges.pairs, edges.seconds) for edges in find_edges(problem, position)]
+    return sum(pairs for pairs, _ in done) / sum(seconds for _, seconds in done)
 
 
 def growing(nodes: int) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .errors import InputError
+from .errors import InputError, Stopped
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -56,14 +56,46 @@ def cli() -> None:
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-def build(scenario: str, output: Path, threads: int | None, overrides: tuple[str, ...]) -> None:
-    """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one."""
+@click.option("--shard", metavar="K/N", help="Build part K of N alone, for `merge`.")
+@click.option("--restart", is_flag=True, help="Forget what a stopped build has kept, and begin anew.")
+@click.option(
+    "--checkpoint", type=float, metavar="SECONDS", help="How often the disk must keep it; 30 if not given."
+)
+def build(
+    scenario: str,
+    output: Path,
+    threads: int | None,
+    overrides: tuple[str, ...],
+    shard: str | None,
+    restart: bool,
+    checkpoint: float | None,
+) -> None:
+    """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
+
+    What is found is kept beside the output until it is whole: the same command goes on where it was stopped.
+    """
     from . import planner
     from .progress import reporter
 
+    job: dict[str, Any] = {"restart": restart} | ({} if checkpoint is None else {"checkpoint": checkpoint})
+    run = {"threads": threads, "overrides": overrides, **job}
     with reporter("build") as progress:
-        roadmap = planner.build(scenario, output, threads=threads, overrides=overrides, progress=progress)
-    click.echo(f"{roadmap}\n  file:   {output}")
+        if shard is not None:
+            planner.build_part(scenario, output, shard, progress=progress, **run)
+            done = f"part {shard} of a roadmap"
+        else:
+            done = str(planner.build(scenario, output, progress=progress, **run))
+    click.echo(f"{done}\n  file:   {output}")
+
+
+@cli.command()
+@click.argument("parts", nargs=-1, required=True, type=FILE)
+@click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
+def merge(parts: tuple[Path, ...], output: Path) -> None:
+    """Make one roadmap of PARTS, which `build --shard` wrote."""
+    from . import planner
+
+    click.echo(f"{planner.merge(parts, output)}\n  file:   {output}")
 
 
 @cli.command()
@@ -222,8 +254,10 @@ def main() -> None:
         _refuse(f"{error.filename or 'standard output'} cannot be used: {reason}; name another")
     except MemoryError as error:
         _refuse(f"there is not enough memory ({error}); make the problem smaller")
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("glider-stream: stopped", err=True)
+    except (click.Abort, KeyboardInterrupt) as error:
+        # click makes an Abort of a KeyboardInterrupt
+        stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
+        click.echo(f"glider-stream: {stopped}", err=True)
         sys.exit(130)
 
 

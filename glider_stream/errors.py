@@ -3,3 +3,11 @@
 
 class InputError(ValueError):
     """Unusable input; the message is one sentence that names the value received and the cure."""
+
+
+class Unwritable(InputError):
+    """An output that cannot be written whole, as on a full disk."""
+
+
+class Stopped(KeyboardInterrupt):
+    """Work that was interrupted from the keyboard; the message says what is kept, and how to go on."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .kernels import flow as kernel
+from .kernels.terrain import Terrain
 from .settings import require
 from .threads import in_parallel
 
@@ -328,8 +329,8 @@ def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, 
     return float(np.hypot(off[:, 0], off[:, 1]).max())
 
 
-def flow_sha256(flow: kernel.Flow) -> str:
-    """A digest of everything the kernels can read of a flow."""
+def flow_sha256(flow: kernel.Flow | Terrain) -> str:
+    """A digest of everything the kernels can read of a flow, or of a terrain."""
     text = hashlib.sha256(type(flow).__name__.encode())
     for name, value in zip(flow._fields, flow, strict=True):
         array = np.ascontiguousarray(value)

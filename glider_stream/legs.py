@@ -12,6 +12,8 @@ from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+SAMPLED = 16
+"""Nodes whose pairs are counted before any work is cut."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,13 @@ class Attached:
 class Legs(Protocol):
     """How legs between the nodes of a roadmap, and points beside it, are found."""
 
-    def of(self, first: int, pairs: int) -> Found:
-        """Pairs of the nodes from `first` on, as many whole nodes as make some `pairs` pairs."""
+    @property
+    def pairs_per_node(self) -> int:
+        """Some number of pairs that a node makes, to cut work by."""
+        ...
+
+    def of(self, source: Index) -> Found:
+        """Pairs from the nodes `source`."""
         ...
 
     def away(self, point: Array) -> Attached:
@@ -65,15 +72,15 @@ class NeighbourLegs:
     departure: float
     neighbourhood: Neighbourhood
 
-    def of(self, first: int, pairs: int) -> Found:
+    @property
+    def pairs_per_node(self) -> int:
+        """As Legs says: the most of some nodes, far apart in the order."""
+        some = np.linspace(0, len(self.position) - 1, SAMPLED).astype(np.int64)
+        return max(1, *(len(self.neighbourhood.of(self.position[n])) for n in some))
+
+    def of(self, source: Index) -> Found:
         """As Legs says."""
-        rows = [self.neighbourhood.of(self.position[first])]
-        count = len(rows[0])
-        while first + len(rows) < len(self.position) and count < pairs:
-            rows.append(self.neighbourhood.of(self.position[first + len(rows)]))
-            count += len(rows[-1])
-        indptr, target = as_csr(rows)
-        source = np.arange(first, first + len(rows))
+        indptr, target = as_csr([self.neighbourhood.of(self.position[n]) for n in source])
         outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
         return Found(indptr, target, outcomes)
 
@@ -106,10 +113,13 @@ class ReachableLegs:
     def __post_init__(self) -> None:
         object.__setattr__(self, "_fan", self.evaluator.by_fan())
 
-    def of(self, first: int, pairs: int) -> Found:
+    @property
+    def pairs_per_node(self) -> int:
         """As Legs says."""
-        room = 2 * self.limit if self.limit else len(self.position)
-        source = np.arange(first, min(first + max(1, pairs // room), len(self.position)))
+        return 2 * self.limit if self.limit else len(self.position)
+
+    def of(self, source: Index) -> Found:
+        """As Legs says."""
         indptr, target, outcomes = self._fan.reach(self.position, self.departure, source, self.limit)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
             outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)

@@ -9,12 +9,14 @@ import numpy as np
 
 from .domain import Array, Point
 from .export import check_export, export_path
+from .jobs import Job, build_file, shard_of
+from .jobs import merge as merge_parts
 from .path import Path, load_path
 from .query import Planner, check_unchanged
 from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .settings import require
-from .store import build_file, check_output, read_roadmap
+from .store import check_output, read_roadmap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,20 +35,51 @@ def build(
     threads: int | None = None,
     overrides: Sequence[str] = (),
     progress: Callable[[Progress], None] = lambda progress: None,
+    **job: Any,
 ) -> Roadmap:
-    """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says."""
+    """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says.
+
+    A build into a file goes on where an earlier one of the same was stopped. `job` as `jobs.Job` has it:
+    `restart`, to begin anew; `checkpoint` [s], how often the disk is asked to keep what was found.
+    """
+    resolved = _resolved(scenario, output, overrides)
+    if output is None:
+        require(not job, f"{', '.join(job)} need an output file; name one")
+        return build_roadmap(resolved.problem(), threads, progress)
+    build_file(resolved.problem(), output, threads, progress, job=Job(**job))
+    return read_roadmap(output)
+
+
+def build_part(
+    scenario: str | File | Scenario,
+    output: str | File,
+    shard: str,
+    *,
+    threads: int | None = None,
+    overrides: Sequence[str] = (),
+    progress: Callable[[Progress], None] = lambda progress: None,
+    **job: Any,
+) -> None:
+    """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; else as `build`."""
+    resolved, part = _resolved(scenario, output, overrides), shard_of(shard)
+    build_file(resolved.problem(), output, threads, progress, job=Job(shard=part, **job))
+
+
+def _resolved(scenario: str | File | Scenario, output: str | File | None, overrides: Sequence[str]) -> Scenario:
+    """The scenario to build, once it is known that its output can be written."""
     if output is not None:
         check_output(output)
     if isinstance(scenario, Scenario):
         require(not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}")
-        resolved = scenario
-    else:
-        itself = output is not None and realpath(output) == realpath(scenario)
-        require(not itself, f"the output {output} is the scenario itself; name another file")
-        resolved = read_scenario(scenario, overrides)
-    if output is None:
-        return build_roadmap(resolved.problem(), threads, progress)
-    build_file(resolved.problem(), output, threads, progress)
+        return scenario
+    itself = output is not None and realpath(output) == realpath(scenario)
+    require(not itself, f"the output {output} is the scenario itself; name another file")
+    return read_scenario(scenario, overrides)
+
+
+def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
+    """One roadmap of the parts that builds with `shard` wrote."""
+    merge_parts(parts, output)
     return read_roadmap(output)
 
 

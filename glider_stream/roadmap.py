@@ -1,8 +1,10 @@
 """The roadmap: nodes, the legs between them, and how it is built."""
 
+import hashlib
 import math
+import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -11,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import Evaluator, count_statuses
+from .edges import Evaluator
 from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.cache import KERNEL_DIGEST
@@ -90,7 +92,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What made a roadmap."""
+    """What made a roadmap; what a file of an earlier version of the program does not say is empty."""
 
     scenario: str
     flow: str
@@ -101,27 +103,77 @@ class Provenance:
     seed: int
     created: str
     software_version: str
+    scenario_sha256: str = ""
+    terrain_sha256: str = ""
+    nodes_sha256: str = ""
+    libraries: str = ""
+    machine: str = ""
+
+    def identity(self) -> dict[str, str]:
+        """What two roadmaps, or parts of one, must share to hold the same edges."""
+        keys = (
+            "scenario_sha256",
+            "nodes_sha256",
+            "flow_sha256",
+            "terrain_sha256",
+            "glider_sha256",
+            "kernel_digest",
+        )
+        return {key: getattr(self, key) for key in keys}
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Edges of consecutive nodes: the `degree` of each (nodes,), `target` (edges,), rising within a node's.
+    """What was found from some nodes `source` (n,), rising: the `degree` of each (n,), the edges, the pairs.
 
-    `values` (edges, 6): the numbers of each edge, in the order of EDGE_FIELDS.
+    `target` (edges,) rises within a node's; `values` (edges, 6) in the order of EDGE_FIELDS; `counts`
+    (n, statuses) pairs by Status; `seconds` that it took, compilation left out.
     """
 
+    source: Index
     degree: Index
     target: NDArray[np.int32]
     values: Array
+    counts: NDArray[np.int32]
+    seconds: float = 0.0
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs were looked at."""
+        return int(self.counts.sum())
+
+    def of(self, chosen: NDArray[np.bool_]) -> "Edges":
+        """Those of some of the nodes (n,)."""
+        edges = np.repeat(chosen, self.degree)
+        kept = self.source[chosen], self.degree[chosen], self.target[edges], self.values[edges]
+        return Edges(*kept, self.counts[chosen])
 
 
-@dataclass(frozen=True)
-class Tally:
-    """What a build has looked at: pairs by status, wall time [s] without compilation, threads."""
+def in_order(parts: Sequence[Edges]) -> Edges:
+    """The edges of several sets of nodes as one, by the nodes' numbers."""
+    none: list[NDArray[Any]] = [np.empty((0, *shape), kind) for shape, kind in EMPTY]
+    parts = [Edges(none[0], none[1], none[2], none[3], none[4]), *parts]
+    source, degree = (np.concatenate([getattr(part, name) for part in parts]) for name in ("source", "degree"))
+    nodes = np.argsort(source, kind="stable")
+    edges = np.argsort(np.repeat(source, degree), kind="stable")
+    return Edges(
+        source[nodes],
+        degree[nodes],
+        np.concatenate([part.target for part in parts])[edges],
+        np.concatenate([part.values for part in parts])[edges],
+        np.concatenate([part.counts for part in parts])[nodes],
+        sum(part.seconds for part in parts),
+    )
 
-    counts: dict[str, int]
-    wall_s: float
-    threads: int
+
+EMPTY = (
+    ((), np.int64),
+    ((), np.int64),
+    ((), np.int32),
+    ((len(EDGE_FIELDS),), np.float64),
+    ((len(Status),), np.int32),
+)
+"""Shapes and types of the arrays of `Edges`."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +181,8 @@ class Roadmap:
     """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
 
     `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
-    (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status.
+    (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
+    `node_counts` (n, statuses) those of each node, where the file has them.
     """
 
     position: Array
@@ -145,7 +198,8 @@ class Roadmap:
     provenance: Provenance
     wall_s: float
     threads: int
-    lonlat: Array | None = field(default=None)
+    lonlat: Array | None = None
+    node_counts: NDArray[np.int32] | None = None
 
     @property
     def evaluated(self) -> int:
@@ -204,41 +258,59 @@ def node_positions(problem: Problem) -> Array:
 
 def warm_up(problem: Problem) -> None:
     """Compile the kernels that a build needs, or load them from the disk cache."""
-    problem.legs(problem.lo[None]).of(0, 1)
+    problem.legs(problem.lo[None]).of(np.zeros(1, np.int64))
 
 
 def find_edges(
-    problem: Problem,
-    position: Array,
-    keep: Callable[[Edges], None],
-    thread_count: int | None = None,
-    progress: Callable[[Progress], None] = lambda progress: None,
-    batch_pairs: int = BATCH_PAIRS,
-) -> Tally:
-    """Evaluate all neighbour pairs of nodes (n, 3) [m], in batches of whole nodes of some `batch_pairs` pairs.
+    problem: Problem, position: Array, source: Index | None = None, batch_pairs: int = BATCH_PAIRS
+) -> Iterator[Edges]:
+    """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
 
-    Each batch's edges are handed to `keep`, in order, and forgotten. Neither the number of threads nor the
-    batch size changes a bit of the result.
+    Neither the number of threads nor the batches change a bit of the result.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
-    legs, nodes = problem.legs(position), len(position)
-    counts = dict.fromkeys((status.name.lower() for status in Status), 0)
-    with threads(thread_count) as used:
-        warm_up(problem)
-        began = time.perf_counter()
-        first, looked = 0, 0
-        while first < nodes:
-            batch = legs.of(first, batch_pairs)
-            connected = batch.outcomes[:, 0] == Status.CONNECTED
-            degree = np.diff(np.concatenate([[0], np.cumsum(connected)])[batch.indptr])
-            target = batch.target[connected].astype(np.int32)
-            keep(Edges(degree, target, batch.outcomes[connected, 1:]))
-            for name, count in count_statuses(batch.outcomes).items():
-                counts[name] += count
-            first, looked = first + degree.size, looked + batch.target.size
-            total = looked + round(looked / first * (nodes - first))
-            progress(Progress(looked, total, counts["connected"], time.perf_counter() - began))
-        return Tally(counts, time.perf_counter() - began, used)
+    legs = problem.legs(position)
+    source = np.arange(len(position)) if source is None else source
+    size = max(1, batch_pairs // legs.pairs_per_node)
+    for first in range(0, len(source), size):
+        yield _evaluated(legs, source[first : first + size])
+
+
+def _evaluated(legs: Legs, source: Index) -> Edges:
+    began = time.perf_counter()
+    batch = legs.of(source)
+    status = batch.outcomes[:, 0].astype(np.int64)
+    connected = status == Status.CONNECTED
+    node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
+    counts = np.bincount(node * len(Status) + status, minlength=len(source) * len(Status))
+    by_node: NDArray[np.int32] = counts.reshape(len(source), len(Status)).astype(np.int32)
+    target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, 1:]
+    degree = np.bincount(node[connected], minlength=len(source))
+    return Edges(source, degree, target, values, by_node, time.perf_counter() - began)
+
+
+@dataclass
+class Tally:
+    """What a build of `nodes` has looked at so far: pairs by status, seconds, compilation left out, threads."""
+
+    nodes: int
+    threads: int
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(Status), np.int64))
+    seconds: float = 0.0
+    done: int = 0
+
+    def add(self, edges: Edges) -> Progress:
+        """Count some more nodes' pairs; how far that is."""
+        self.counts += edges.counts.sum(axis=0)
+        self.seconds += edges.seconds
+        self.done += edges.source.size
+        looked = int(self.counts.sum())
+        total = looked + round(looked / max(self.done, 1) * (self.nodes - self.done))
+        return Progress(looked, total, int(self.counts[Status.CONNECTED]), self.seconds)
+
+    def by_name(self) -> dict[str, int]:
+        """Pairs by the name of their status, in lower case."""
+        return {status.name.lower(): int(self.counts[status]) for status in Status}
 
 
 def build_roadmap(
@@ -247,21 +319,27 @@ def build_roadmap(
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
 ) -> Roadmap:
-    """A problem's roadmap, in memory; see `find_edges`, and `store.build_file` for one on disk."""
+    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk."""
     position = node_positions(problem)
     parts: list[Edges] = []
-    tally = find_edges(problem, position, parts.append, thread_count, progress, batch_pairs)
-    columns = {name: np.concatenate([part.values[:, n] for part in parts]) for n, name in enumerate(EDGE_FIELDS)}
+    with threads(thread_count) as used:
+        warm_up(problem)
+        tally = Tally(len(position), used)
+        for edges in find_edges(problem, position, batch_pairs=batch_pairs):
+            parts.append(edges)
+            progress(tally.add(edges))
+    whole = in_order(parts)
     return Roadmap(
         position=position,
-        indptr=np.concatenate([[0], np.cumsum(np.concatenate([part.degree for part in parts]))]),
-        target=np.concatenate([part.target for part in parts]),
-        provenance=provenance_of(problem),
+        indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
+        target=whole.target,
+        provenance=provenance_of(problem, position),
         lonlat=lonlat_of(problem, position),
-        counts=tally.counts,
-        wall_s=tally.wall_s,
-        threads=tally.threads,
-        **columns,
+        counts=tally.by_name(),
+        wall_s=tally.seconds,
+        threads=used,
+        node_counts=whole.counts,
+        **{name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)},
     )
 
 
@@ -270,16 +348,21 @@ def lonlat_of(problem: Problem, position: Array) -> Array | None:
     return None if problem.to_lonlat is None else problem.to_lonlat(position)
 
 
-def provenance_of(problem: Problem) -> Provenance:
-    """What a roadmap of this problem is made by, now."""
+def provenance_of(problem: Problem, position: Array) -> Provenance:
+    """What a roadmap of this problem, with nodes (n, 3) [m], is made by, now."""
     return Provenance(
         scenario=problem.scenario,
         flow=problem.flow_words,
         glider=problem.glider_words,
+        scenario_sha256=hashlib.sha256(problem.scenario.encode()).hexdigest(),
         flow_sha256=flow_sha256(problem.evaluator.flow),
+        terrain_sha256=flow_sha256(problem.evaluator.terrain),
         glider_sha256=glider_sha256(problem.evaluator.polar),
+        nodes_sha256=hashlib.sha256(np.ascontiguousarray(position, "<f8").tobytes()).hexdigest(),
         kernel_digest=KERNEL_DIGEST,
         seed=problem.sampler.seed,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         software_version=version("glider-stream"),
+        libraries=", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
+        machine=f"{platform.node()}, {platform.machine()}, Python {platform.python_version()}",
     )

@@ -4,8 +4,8 @@ import contextlib
 import io
 import os
 import tempfile
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, fields
+from collections.abc import Iterator
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +13,15 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import InputError, Unwritable
+from .hdf5 import check_links
 from .kernels.edges import Status
-from .roadmap import (
-    BATCH_PAIRS,
-    EDGE_FIELDS,
-    Edges,
-    Problem,
-    Progress,
-    Provenance,
-    Roadmap,
-    Tally,
-    find_edges,
-    lonlat_of,
-    node_positions,
-    provenance_of,
-)
+from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, Tally
 from .settings import require
 
 Array = NDArray[Any]
 FORMAT = "glider-stream/roadmap"
+PART_FORMAT = "glider-stream/roadmap-part"
 VERSION = 1
 CHUNK = 32768
 """Edges in a chunk of a dataset, 256 kB: one is checked and cached whole."""
@@ -48,7 +37,46 @@ _DESCRIBED = {
     "edges/heading": ("f8", "rad", "heading through water, counter-clockwise from east"),
     "edges/speed": ("f8", "m s-1", "speed through water along the glide path"),
     "edges/miss": ("f8", "m", "distance from the target at closest approach"),
+    "pairs/by_node": ("i4", "1", "pairs of each source node by status, in the order of the attribute `statuses`"),
 }
+_OPTIONAL = {"nodes/lonlat", "pairs/by_node"}
+MOST_RATIO = 1100
+"""Deflate packs no better than 1032 to 1: a dataset that claims more than that of its file is none."""
+FREE = 50_000_000
+"""Claims up to this size [bytes] need no proof."""
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part `number`, from 1, of `count` parts of a roadmap."""
+
+    number: int
+    count: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is all there is."""
+        return self.count == 1
+
+    def nodes(self, count: int) -> tuple[int, int]:
+        """The first source node, and that after the last, of `count` nodes."""
+        return (self.number - 1) * count // self.count, self.number * count // self.count
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A shard out of its file; `edges` are None where only the head was read."""
+
+    shard: Shard
+    provenance: Provenance
+    position: Array
+    lonlat: Array | None
+    edges: Edges | None
+    wall_s: float
+    threads: int
 
 
 def check_output(path: str | Path) -> None:
@@ -83,6 +111,8 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
+        with temporary.open("rb") as whole:
+            os.fsync(whole.fileno())
         # mkstemp makes files for their owner alone; an output is as readable as any new file
         mask = os.umask(0)
         os.umask(mask)
@@ -91,7 +121,7 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         reason = (error.strerror or "it cannot be written").lower()
         room = "make room on its disk, or name another output"
-        raise InputError(f"the output {path} cannot be written whole: {reason}; {room}") from None
+        raise Unwritable(f"the output {path} cannot be written whole: {reason}; {room}") from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -125,13 +155,22 @@ class RoadmapWriter:
     """An open roadmap file that takes its edges batch by batch, in the order of their source nodes."""
 
     def __init__(
-        self, disk: Guarded, file: h5py.File, position: Array, lonlat: Array | None, made: Provenance
+        self,
+        disk: Guarded,
+        file: h5py.File,
+        position: Array,
+        lonlat: Array | None,
+        made: Provenance,
+        shard: Shard,
     ) -> None:
         """Write what is known before the edges are."""
         self._disk, self._file = disk, file
         self._waiting: list[Edges] = []
         self._degree: list[Array] = []
-        file.attrs["format"] = FORMAT
+        self._counts: list[Array] = []
+        file.attrs["format"] = FORMAT if shard.whole else PART_FORMAT
+        if not shard.whole:
+            file.attrs["shard"] = str(shard)
         file.attrs["format_version"] = VERSION
         for name, value in asdict(made).items():
             file.attrs[name] = value
@@ -142,6 +181,7 @@ class RoadmapWriter:
     def append(self, edges: Edges) -> None:
         """Take the edges of the next nodes."""
         self._degree.append(edges.degree)
+        self._counts.append(edges.counts)
         self._waiting.append(edges)
         if sum(one.target.size for one in self._waiting) >= CHUNK:
             self._flush()
@@ -151,11 +191,14 @@ class RoadmapWriter:
         self._flush()
         degree = np.concatenate([np.zeros(1, np.int64), *self._degree])
         self._put("edges/indptr", np.cumsum(degree))
-        pairs = self._file.create_group("pairs")
-        pairs.attrs["evaluated"] = sum(tally.counts.values())
-        for name, count in tally.counts.items():
+        by_name = tally.by_name()
+        self._put("pairs/by_node", np.concatenate([np.empty((0, len(by_name)), np.int32), *self._counts]))
+        self._file["pairs/by_node"].attrs["statuses"] = " ".join(by_name)
+        pairs = self._file["pairs"]
+        pairs.attrs["evaluated"] = sum(by_name.values())
+        for name, count in by_name.items():
             pairs.attrs[name] = count
-        pairs.attrs["wall_s"] = tally.wall_s
+        pairs.attrs["wall_s"] = tally.seconds
         pairs.attrs["threads"] = tally.threads
         self._file.attrs["complete"] = True
 
@@ -186,59 +229,111 @@ class RoadmapWriter:
 
 
 @contextlib.contextmanager
-def _writing(
-    path: str | Path, position: Array, lonlat: Array | None, made: Provenance
+def writing(
+    path: str | Path, position: Array, lonlat: Array | None, made: Provenance, shard: Shard
 ) -> Iterator[RoadmapWriter]:
     """A roadmap file in the making; at `path` when the block ends well, and not at all else."""
     with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
         with h5py.File(disk, "w") as file:
-            yield RoadmapWriter(disk, file, position, lonlat, made)
+            yield RoadmapWriter(disk, file, position, lonlat, made, shard)
         disk.check()
 
 
 def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
     """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
-    with _writing(path, roadmap.position, roadmap.lonlat, roadmap.provenance) as file:
-        file.append(Edges(np.diff(roadmap.indptr), roadmap.target, values))
-        file.finish(Tally(roadmap.counts, roadmap.wall_s, roadmap.threads))
-
-
-def build_file(
-    problem: Problem,
-    path: str | Path,
-    thread_count: int | None = None,
-    progress: Callable[[Progress], None] = lambda progress: None,
-    batch_pairs: int = BATCH_PAIRS,
-) -> None:
-    """Build a problem's roadmap into a file, batch by batch: memory holds the nodes and one batch of edges."""
-    position = node_positions(problem)
-    with _writing(path, position, lonlat_of(problem, position), provenance_of(problem)) as file:
-        file.finish(find_edges(problem, position, file.append, thread_count, progress, batch_pairs))
+    nodes = len(roadmap.position)
+    counts = np.zeros((nodes, len(Status)), np.int32) if roadmap.node_counts is None else roadmap.node_counts
+    tally = Tally(
+        nodes, roadmap.threads, np.array([roadmap.counts[s.name.lower()] for s in Status]), roadmap.wall_s
+    )
+    with writing(path, roadmap.position, roadmap.lonlat, roadmap.provenance, Shard(1, 1)) as file:
+        file.append(Edges(np.arange(nodes), np.diff(roadmap.indptr), roadmap.target, values, counts))
+        file.finish(tally)
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
     """Read a roadmap file; InputError where it is not one, newer, incomplete or damaged."""
     path = Path(path)
+    with _reading(path) as file:
+        _check_head(file, path, FORMAT)
+        arrays = _arrays(file, path, list(_DESCRIBED))
+        _check_edges(arrays, len(arrays["nodes/position"]), path)
+        wall, used = _effort(file, path)
+        pairs = file["pairs"].attrs
+        counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
+        counted = min(counts.values()) >= 0
+        require(counted, f"the roadmap {path} is damaged: a count of its pairs makes no sense; build it again")
+        return Roadmap(
+            position=arrays["nodes/position"],
+            indptr=arrays["edges/indptr"],
+            target=arrays["edges/target"],
+            **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
+            counts=counts,
+            provenance=_provenance(file),
+            wall_s=wall,
+            threads=used,
+            lonlat=arrays.get("nodes/lonlat"),
+            node_counts=arrays.get("pairs/by_node"),
+        )
+    raise AssertionError  # _reading raises
+
+
+def read_part(path: str | Path, edges: bool = True) -> Part:
+    """Read a shard's file, or with `edges` false its head alone; InputError where it is none, or damaged."""
+    path = Path(path)
+    with _reading(path) as file:
+        _check_head(file, path, PART_FORMAT)
+        number, _, count = str(file.attrs["shard"]).partition("/")
+        shard = Shard(int(number), int(count))
+        require(
+            1 <= shard.number <= shard.count, f"the part {path} is damaged: it says it is {shard}; build it again"
+        )
+        arrays = _arrays(file, path, list(_DESCRIBED) if edges else ["nodes/position", "nodes/lonlat"])
+        nodes = np.arange(*shard.nodes(len(arrays["nodes/position"])))
+        found = None
+        if edges:
+            _check_edges(arrays, len(nodes), path)
+            values = np.stack([arrays[f"edges/{name}"] for name in EDGE_FIELDS], axis=1)
+            require(
+                "pairs/by_node" in arrays, f"the part {path} is damaged: it has no pairs/by_node; build it again"
+            )
+            degree = np.diff(arrays["edges/indptr"])
+            found = Edges(nodes, degree, arrays["edges/target"], values, arrays["pairs/by_node"])
+        made = _provenance(file)
+        return Part(
+            shard, made, arrays["nodes/position"], arrays.get("nodes/lonlat"), found, *_effort(file, path)
+        )
+    raise AssertionError  # _reading raises
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[h5py.File]:
+    """An open file of ours; whatever its damage makes h5py raise is an InputError."""
     require(path.exists(), f"the roadmap {path} does not exist; build it first")
     try:
+        check_links(path)
         with h5py.File(path, "r") as file:
-            return _read(file, path)
+            yield file
     except (OSError, RuntimeError) as error:
         reason = "a checksum fails" if "filter" in str(error) else "it is no HDF5 file, or it is cut short"
         if isinstance(error, OSError) and error.errno:
             reason = os.strerror(error.errno).lower()
         raise InputError(f"the roadmap {path} cannot be read: {reason}; build it again") from None
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"the roadmap {path} is damaged: {' '.join(str(error).split())}") from None
 
 
-def _read(file: h5py.File, path: Path) -> Roadmap:
+def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
     said = file.attrs.get("format")
-    what = "none" if said is None else repr(said)
-    require(said == FORMAT, f"{path} is not a roadmap, its format is {what}; give a file that `build` wrote")
+    if said == PART_FORMAT and wanted == FORMAT:
+        shard = str(file.attrs.get("shard"))
+        raise InputError(f"{path} is part {shard} of a roadmap; make it whole with `glider-stream merge`")
+    what, command = "none" if said is None else repr(said), "build" if wanted == FORMAT else "build --shard"
+    noun = "a roadmap" if wanted == FORMAT else "a part of a roadmap"
+    require(said == wanted, f"{path} is not {noun}, its format is {what}; give a file that `{command}` wrote")
     version = int(file.attrs["format_version"])
     require(
         version == VERSION,
@@ -249,23 +344,37 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
     require(
         isinstance(complete, np.bool_) and bool(complete), f"the roadmap {path} is incomplete; build it again"
     )
-    arrays = {}
-    for name, (kind, _, _) in _DESCRIBED.items():
-        if name == "nodes/lonlat" and name not in file:
+
+
+def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, Array]:
+    """The datasets by name, of the kind that they should be and no larger than the file can hold."""
+    arrays: dict[str, Array] = {}
+    held = path.stat().st_size
+    for name in names:
+        kind = _DESCRIBED[name][0]
+        if name in _OPTIONAL and name not in file:
             continue
         require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
+        claimed = float(np.prod(file[name].shape, dtype=np.float64)) * file[name].dtype.itemsize
+        fits = claimed <= max(FREE, MOST_RATIO * held)
+        require(fits, f"the roadmap {path} is damaged: {name} claims {claimed:.3g} bytes; build it again")
         stored = np.asarray(file[name][()])
         fits = stored.dtype.kind == np.dtype(kind).kind
         require(fits, f"the roadmap {path} is damaged: {name} is {stored.dtype}, not {kind}; build it again")
         arrays[name] = stored.astype(kind, copy=False)
         finite = bool(np.isfinite(arrays[name]).all())
         require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
+    return arrays
+
+
+def _check_edges(arrays: dict[str, Array], rows: int, path: Path) -> None:
+    """InputError unless the datasets fit each other: edges of so many rows among the nodes."""
     position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]
-    lonlat = arrays.get("nodes/lonlat")
+    lonlat, counts = arrays.get("nodes/lonlat"), arrays.get("pairs/by_node")
     nodes, edges = len(position), target.size
     whole = (
         position.shape == (nodes, 3)
-        and indptr.shape == (nodes + 1,)
+        and indptr.shape == (rows + 1,)
         and indptr[0] == 0
         and indptr[-1] == edges
         and bool((np.diff(indptr) >= 0).all())
@@ -273,6 +382,7 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
         and target.shape == (edges,)
         and (edges == 0 or bool(target.min() >= 0 and target.max() < nodes))
         and (lonlat is None or lonlat.shape == (nodes, 2))
+        and (counts is None or (counts.shape == (rows, len(Status)) and bool((counts >= 0).all())))
     )
     require(whole, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
     for name in ("time", "cost", "speed", "miss"):
@@ -281,22 +391,17 @@ def _read(file: h5py.File, path: Path) -> Roadmap:
     rises = target[1:] > target[:-1]
     rises[indptr[1:-1][(indptr[1:-1] > 0) & (indptr[1:-1] < edges)] - 1] = True  # from one row to the next
     require(bool(rises.all()), f"the roadmap {path} is damaged: its targets do not rise; build it again")
+
+
+def _effort(file: h5py.File, path: Path) -> tuple[float, int]:
+    """Seconds and threads of a build."""
     pairs = file["pairs"].attrs
-    counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
-    wall = float(pairs["wall_s"])
-    counted = min(counts.values()) >= 0 and 0 <= wall < np.inf
-    require(counted, f"the roadmap {path} is damaged: a count or its wall time makes no sense; build it again")
-    return Roadmap(
-        position=position,
-        indptr=indptr,
-        target=target,
-        **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
-        counts=counts,
-        provenance=Provenance(
-            seed=int(file.attrs["seed"]),
-            **{f.name: str(file.attrs[f.name]) for f in fields(Provenance) if f.name != "seed"},
-        ),
-        wall_s=wall,
-        threads=int(pairs["threads"]),
-        lonlat=lonlat,
-    )
+    wall, used = float(pairs["wall_s"]), int(pairs["threads"])
+    require(0 <= wall < np.inf, f"the roadmap {path} is damaged: its wall time makes no sense; build it again")
+    return wall, used
+
+
+def _provenance(file: h5py.File) -> Provenance:
+    said = file.attrs
+    words = {f.name: said[f.name] if f.default is MISSING else said.get(f.name, "") for f in fields(Provenance)}
+    return Provenance(seed=int(words.pop("seed")), **{name: str(value) for name, value in words.items()})

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from small import roadmap, scenario_file
 
-from glider_stream import store
+from glider_stream import jobs, store
 from glider_stream.errors import InputError
 from glider_stream.flow import flow_sha256
 from glider_stream.glider import glider_sha256
@@ -34,6 +34,7 @@ DATASETS = {
     "edges/heading": ("<f8", "rad"),
     "edges/speed": ("<f8", "m s-1"),
     "edges/miss": ("<f8", "m"),
+    "pairs/by_node": ("<i4", "1"),
 }
 
 
@@ -59,7 +60,7 @@ def assert_same(a, b):
 def test_a_file_written_in_batches_is_the_roadmap(tmp_path, monkeypatch, chunk, batch):
     monkeypatch.setattr(store, "CHUNK", chunk)
     scenario = scenario_file(tmp_path)
-    store.build_file(read_scenario(scenario).problem(), tmp_path / "road.h5", batch_pairs=batch)
+    jobs.build_file(read_scenario(scenario).problem(), tmp_path / "road.h5", batch_pairs=batch)
     road = read_roadmap(tmp_path / "road.h5")
     assert_same(replace(road, provenance=None, wall_s=0.0), replace(roadmap(), provenance=None, wall_s=0.0))
 
@@ -88,7 +89,7 @@ def test_the_file_in_plain_h5py(file):
     road = roadmap()
     nodes, edges = len(road.position), road.target.size
     assert edges > 100
-    shapes = {"nodes/position": (nodes, 3), "edges/indptr": (nodes + 1,)}
+    shapes = {"nodes/position": (nodes, 3), "edges/indptr": (nodes + 1,), "pairs/by_node": (nodes, len(Status))}
     with h5py.File(file) as opened:
         found = []
         opened.visititems(lambda name, one: found.append(name) if isinstance(one, h5py.Dataset) else None)

@@ -1,0 +1,224 @@
+"""Jobs: builds that survive their process, in parts, on what an older roadmap holds, and on a cluster."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError, Stopped, Unwritable
+from .journal import Journal
+from .lock import locked
+from .roadmap import (
+    BATCH_PAIRS,
+    EDGE_FIELDS,
+    Edges,
+    Problem,
+    Progress,
+    Provenance,
+    Roadmap,
+    Tally,
+    find_edges,
+    in_order,
+    lonlat_of,
+    node_positions,
+    provenance_of,
+    warm_up,
+)
+from .settings import require
+from .store import Shard, check_output, read_part, writing
+from .threads import threads
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Finder = Callable[[Problem, Array, Index, int], Iterator[Edges]]
+CHECKPOINT = 30.0
+"""Seconds between two requests that the disk keep what was found."""
+
+
+def shard_of(text: str) -> Shard:
+    """The shard 3 of 16 from "3/16"."""
+    match = re.fullmatch(r"\s*(\d{1,7})\s*/\s*(\d{1,7})\s*", text)
+    number, count = (int(match.group(n)) for n in (1, 2)) if match else (0, 0)
+    require(1 <= number <= count, f"a shard is a number of a count, such as 3/16; got {text!r}")
+    return Shard(number, count)
+
+
+@dataclass(frozen=True)
+class Job:
+    """How a build is run; nothing of it changes a bit of what is found.
+
+    `restart`: forget what an earlier run has kept. `checkpoint` [s]: see `Journal`. `shard`: a part alone.
+    `base`: an older roadmap, and the nodes (n,) whose edges it still has right. `finder`: who evaluates;
+    `warm` whether kernels are compiled here first.
+    """
+
+    restart: bool = False
+    checkpoint: float = CHECKPOINT
+    shard: Shard | None = None
+    base: tuple[Roadmap, NDArray[np.bool_]] | None = None
+    finder: Finder = find_edges
+    warm: bool = True
+
+    def __post_init__(self) -> None:
+        require(self.checkpoint >= 0, f"`checkpoint` must be at least 0 s; got {self.checkpoint:g}")
+
+
+def build_file(
+    problem: Problem,
+    path: str | Path,
+    thread_count: int | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+    batch_pairs: int = BATCH_PAIRS,
+    job: Job = Job(),
+) -> None:
+    """Build a problem's roadmap into a file: memory holds the nodes and one batch of edges.
+
+    What is found is kept in a journal beside the file, from which the same call goes on after a kill. The
+    file appears whole, or not at all.
+    """
+    path = Path(path)
+    check_output(path)
+    target = path.resolve()  # a link stays one
+    with locked(target):
+        for left in target.parent.glob(f".{_literal(target.name)}.*{_literal(target.suffix)}"):
+            left.unlink(missing_ok=True)  # by a build that was killed in its last moment
+        position = node_positions(problem)
+        made = provenance_of(problem, position)
+        shard = job.shard or Shard(1, 1)
+        identity = {**made.identity(), "shard": str(shard), "nodes": len(position)}
+        journal_path = target.with_name(f"{target.name}.journal")
+        kept = ""
+        try:
+            with (
+                Journal(journal_path, identity, len(position), job.restart, job.checkpoint) as journal,
+                threads(thread_count) as used,
+            ):
+                try:
+                    _run(problem, position, made, path, journal, shard, job, used, progress, batch_pairs)
+                finally:
+                    kept = (
+                        f"{int(journal.done.sum()):,} of {len(position):,} nodes are kept in {journal_path.name}"
+                    )
+        except KeyboardInterrupt:
+            raise Stopped(f"stopped; {kept}: give the same command again to go on") from None
+        except Unwritable as error:
+            raise InputError(f"{error}; {kept}: give the same command again to go on") from None
+        except OSError as error:
+            reason, more = (error.strerror or "it cannot be written").lower(), ""
+            if kept:
+                more = f"; {kept}: give the same command again to go on"
+            room = "make room on its disk, or name another output"
+            raise InputError(f"the output {path} cannot be written whole: {reason}; {room}{more}") from None
+
+
+def _literal(name: str) -> str:
+    """A name as a pattern that matches it alone."""
+    return re.sub(r"([*?[])", r"[\1]", name)
+
+
+def _run(
+    problem: Problem,
+    position: Array,
+    made: Provenance,
+    path: Path,
+    journal: Journal,
+    shard: Shard,
+    job: Job,
+    used: int,
+    progress: Callable[[Progress], None],
+    batch_pairs: int,
+) -> None:
+    nodes = np.arange(*shard.nodes(len(position)))
+    tally = Tally(len(nodes), used)
+    old = _taken_over(job, nodes)
+    if old is not None:
+        tally.add(old)
+    for edges in journal.records():
+        tally.add(edges)
+    known = journal.done.copy()
+    if old is not None:
+        known[old.source] = True
+    waiting = nodes[~known[nodes]]
+    if waiting.size:
+        if job.warm:
+            warm_up(problem)
+        for edges in job.finder(problem, position, waiting, batch_pairs):
+            journal.append(edges)
+            progress(tally.add(edges))
+    with writing(path, position, lonlat_of(problem, position), made, shard) as file:
+        _write(file.append, old, journal.records())
+        file.finish(tally)
+    journal.remove()
+
+
+def _taken_over(job: Job, nodes: Index) -> Edges | None:
+    """The edges of the nodes that an older roadmap has right."""
+    if job.base is None:
+        return None
+    road, right = job.base
+    assert road.node_counts is not None
+    values = np.stack([getattr(road, name) for name in EDGE_FIELDS], axis=1)
+    every = Edges(np.arange(len(right)), np.diff(road.indptr), road.target, values, road.node_counts)
+    mine = np.zeros(len(right), dtype=bool)
+    mine[nodes] = True
+    return every.of(right & mine)
+
+
+def _write(append: Callable[[Edges], None], old: Edges | None, records: Iterator[Edges]) -> None:
+    """Hand over all edges in the order of their nodes."""
+    if old is None:
+        for edges in records:
+            append(edges)
+        return
+    first = 0
+    for edges in records:
+        last = int(edges.source[-1])
+        append(in_order([edges, old.of((old.source >= first) & (old.source <= last))]))
+        first = last + 1
+    append(old.of(old.source >= first))
+
+
+def merge(parts: Sequence[str | Path], output: str | Path) -> None:
+    """Make one roadmap of its shards; InputError, naming them, where they are not all of one."""
+    check_output(output)
+    require(len(parts) > 0, "there is nothing to merge; name the parts that `build --shard` wrote")
+    heads = [(Path(path), read_part(path, edges=False)) for path in parts]
+    first_path, first = heads[0]
+    seen: dict[int, Path] = {}
+    for path, part in heads:
+        require(
+            part.shard.count == first.shard.count,
+            f"{path} is part {part.shard} and {first_path} part {first.shard}; give parts of one division",
+        )
+        mine, others = part.provenance.identity(), first.provenance.identity()
+        unlike = [key for key in mine if mine[key] != others[key]]
+        require(
+            not unlike,
+            f"{path} is of another roadmap than {first_path}: {', '.join(unlike)} differ; build both alike",
+        )
+        number = part.shard.number
+        require(number not in seen, f"{path} and {seen.get(number)} are both part {part.shard}; leave one out")
+        seen[number] = path
+    lacks = [str(n) for n in range(1, first.shard.count + 1) if n not in seen]
+    said = f"part {lacks[0]}" if len(lacks) == 1 else f"parts {', '.join(lacks[:20])}"
+    require(
+        not lacks, f"{said} of {first.shard.count} {'is' if len(lacks) == 1 else 'are'} missing; build and add it"
+    )
+    target = Path(output)
+    require(
+        all(target.resolve() != path.resolve() for path, _ in heads),
+        f"the output {output} is one of the parts; name another",
+    )
+    with locked(target.resolve()):
+        tally = Tally(len(first.position), max(part.threads for _, part in heads))
+        with writing(target, first.position, first.lonlat, first.provenance, Shard(1, 1)) as file:
+            for _, path in sorted(seen.items()):
+                part = read_part(path)
+                assert part.edges is not None
+                tally.add(part.edges)
+                file.append(part.edges)
+            tally.seconds = sum(part.wall_s for _, part in heads)
+            file.finish(tally)

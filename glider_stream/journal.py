@@ -1,0 +1,182 @@
+"""The journal of a build: what it has found, safe from the end of its process, until the roadmap is whole."""
+
+import hashlib
+import json
+import os
+import struct
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError
+from .roadmap import EMPTY, Edges
+
+MAGIC = b"glider-stream/journal 1\n"
+RECORD = struct.Struct("<4sQQd")
+"""Of each record: a mark, nodes, edges, seconds. Then the arrays of `Edges`, then a digest of it all."""
+MARK = b"edge"
+DIGEST = 16
+LONGEST_HEADER = 100_000
+
+
+def _sizes(nodes: int, edges: int) -> list[tuple[tuple[int, ...], np.dtype[Any]]]:
+    count = (nodes, nodes, edges, edges, nodes)
+    return [((n, *shape), np.dtype(kind)) for n, (shape, kind) in zip(count, EMPTY, strict=True)]
+
+
+class Journal:
+    """Records of `Edges`, each written whole or not at all; `done` tells which nodes they hold.
+
+    What a kill leaves of an unfinished record is cut off. `every` [s]: how often the disk is asked to keep
+    what was written, against the loss of power; the loss of the process alone costs nothing written.
+    """
+
+    def __init__(self, path: Path, identity: Mapping[str, Any], nodes: int, restart: bool, every: float) -> None:
+        """Go on with the journal at `path`, or begin it; InputError where it is of another build."""
+        self.path, self.every = path, every
+        self.done = np.zeros(nodes, dtype=bool)
+        self._places: list[tuple[int, int]] = []
+        self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        self._end = 0
+        self._synced = time.monotonic()
+        try:
+            self._begin(identity, restart)
+        except BaseException as error:
+            self.__exit__(type(error), error, None)
+            raise
+
+    def _begin(self, identity: Mapping[str, Any], restart: bool) -> None:
+        header = MAGIC + json.dumps(identity, sort_keys=True).encode() + b"\n"
+        if restart or not self._resumes(identity):
+            self._file.truncate(0)
+            self._write(header)
+        for record in self._scan():
+            self._note(record)
+        self._file.truncate(self._end)
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if not self._places and not isinstance(error, InputError):
+                self.path.unlink(missing_ok=True)
+            elif self.path.exists():
+                os.fsync(self._file.fileno())
+        except OSError:
+            if error is None:
+                raise
+        finally:
+            self._file.close()
+
+    def _resumes(self, identity: Mapping[str, Any]) -> bool:
+        """Whether there is a journal of the same build; its records begin at `_end`."""
+        self._file.seek(0)
+        head = self._file.read(LONGEST_HEADER)
+        line = head[len(MAGIC) :].split(b"\n", 1)
+        if not head.startswith(MAGIC) or len(line) < 2:
+            # a build that was killed before its first word
+            own = MAGIC.startswith(head[: len(MAGIC)]) or not head
+            if own or head.startswith(MAGIC):
+                return False
+            raise InputError(f"{self.path} is in the way of this build's journal, and is none; move it away")
+        try:
+            said = json.loads(line[0])
+        except (ValueError, RecursionError):
+            said = {}
+        if not isinstance(said, dict) or said != dict(identity):
+            keys = sorted(key for key in {*identity, *said} if dict(said).get(key) != identity.get(key))
+            raise InputError(
+                f"{self.path} keeps the progress of another build, whose {', '.join(keys)} differ; "
+                "finish that one with its own command, or begin anew with --restart"
+            )
+        self._end = len(MAGIC) + len(line[0]) + 1
+        return True
+
+    def _scan(self) -> Iterator[Edges]:
+        """The whole records from `_end` on; moves `_end` past each."""
+        size = os.fstat(self._file.fileno()).st_size
+        while self._end < size:
+            record = self._read(self._end, size)
+            if record is None:
+                return
+            edges, length = record
+            if edges.source.size == 0 or edges.source[0] < 0 or edges.source[-1] >= self.done.size:
+                return
+            self._places.append((int(edges.source[0]), self._end))
+            self._end += length
+            yield edges
+
+    def _read(self, place: int, size: int) -> tuple[Edges, int] | None:
+        """The record at a place, and its length; None where it is cut short or damaged."""
+        self._file.seek(place)
+        head = self._file.read(RECORD.size)
+        if len(head) < RECORD.size:
+            return None
+        mark, nodes, edges, seconds = RECORD.unpack(head)
+        if mark != MARK or max(nodes, edges) > size:
+            return None
+        sizes = _sizes(nodes, edges)
+        lengths = [int(np.prod(shape)) * kind.itemsize for shape, kind in sizes]
+        body = self._file.read(sum(lengths) + DIGEST) if sum(lengths) <= size else b""
+        if len(body) < sum(lengths) + DIGEST:
+            return None
+        if hashlib.blake2b(head + body[:-DIGEST], digest_size=DIGEST).digest() != body[-DIGEST:]:
+            return None
+        ends = np.cumsum(lengths)
+        arrays = [
+            np.frombuffer(body[end - length : end], kind).reshape(shape)
+            for end, length, (shape, kind) in zip(ends, lengths, sizes, strict=True)
+        ]
+        source, degree, target, values, counts = arrays
+        return Edges(source, degree, target, values, counts, seconds), len(head) + len(body)
+
+    def _note(self, edges: Edges) -> None:
+        self.done[edges.source] = True
+
+    def _write(self, whole: bytes) -> None:
+        """Append, or leave the file as it was."""
+        self._file.seek(self._end)
+        try:
+            written = 0
+            while written < len(whole):
+                written += self._file.write(whole[written:]) or 0
+        except OSError:
+            self._file.truncate(self._end)
+            raise
+        self._end += len(whole)
+
+    def append(self, edges: Edges) -> None:
+        """Keep the edges of some nodes."""
+        head = RECORD.pack(MARK, edges.source.size, edges.target.size, edges.seconds)
+        sizes = _sizes(edges.source.size, edges.target.size)
+        arrays = edges.source, edges.degree, edges.target, edges.values, edges.counts
+        kinds = [kind for _, kind in sizes]
+        body = b"".join(
+            np.ascontiguousarray(one, kind).tobytes() for one, kind in zip(arrays, kinds, strict=True)
+        )
+        place = self._end
+        self._write(head + body + hashlib.blake2b(head + body, digest_size=DIGEST).digest())
+        self._places.append((int(edges.source[0]), place))
+        self._note(edges)
+        if time.monotonic() - self._synced >= self.every:
+            os.fsync(self._file.fileno())
+            self._synced = time.monotonic()
+
+    def records(self) -> Iterator[Edges]:
+        """All records, in the order of their first nodes."""
+        for _, place in sorted(self._places):
+            record = self._read(place, self._end)
+            if record is None:
+                raise InputError(f"{self.path} has been damaged while it was in use; begin anew with --restart")
+            yield record[0]
+
+    def remove(self) -> None:
+        """Forget it: the roadmap is in its place."""
+        self.path.unlink(missing_ok=True)
