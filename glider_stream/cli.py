@@ -58,6 +58,7 @@ def cli() -> None:
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
 @click.option("--shard", metavar="K/N", help="Build part K of N alone, for `merge`.")
 @click.option("--restart", is_flag=True, help="Forget what a stopped build has kept, and begin anew.")
+@click.option("--scheduler", metavar="ADDRESS", help="Evaluate on a Dask cluster; local:N for N processes here.")
 @click.option(
     "--checkpoint", type=float, metavar="SECONDS", help="How often the disk must keep it; 30 if not given."
 )
@@ -68,6 +69,7 @@ def build(
     overrides: tuple[str, ...],
     shard: str | None,
     restart: bool,
+    scheduler: str | None,
     checkpoint: float | None,
 ) -> None:
     """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
@@ -77,8 +79,9 @@ def build(
     from . import planner
     from .progress import reporter
 
-    job: dict[str, Any] = {"restart": restart} | ({} if checkpoint is None else {"checkpoint": checkpoint})
-    run = {"threads": threads, "overrides": overrides, **job}
+    given = {"scheduler": scheduler, "checkpoint": checkpoint}
+    job = {name: value for name, value in given.items() if value is not None}
+    run: dict[str, Any] = {"threads": threads, "overrides": overrides, "restart": restart, **job}
     with reporter("build") as progress:
         if shard is not None:
             planner.build_part(scenario, output, shard, progress=progress, **run)
@@ -115,16 +118,19 @@ def query(roadmap: Path, start: Any, goal: Any, outputs: tuple[Path, ...]) -> No
 
 @cli.command()
 @ROADMAP
+@click.option(
+    "--diff", "other", type=FILE, metavar="OTHER", help="Say what differs from another roadmap instead."
+)
 @JSON
-def info(roadmap: Path, as_json: bool) -> None:
+def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
     """Say what ROADMAP holds."""
     from . import planner
 
-    road = planner.info(roadmap)
+    said = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
     if as_json:
-        _write_json(road.as_dict())
+        _write_json(said.as_dict())
     else:
-        click.echo(road)
+        click.echo(said)
 
 
 @cli.command()

@@ -41,7 +41,7 @@ class Journal:
         self.done = np.zeros(nodes, dtype=bool)
         self._places: list[tuple[int, int]] = []
         self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
-        self._end = 0
+        self._end, self._mine = 0, False
         self._synced = time.monotonic()
         try:
             self._begin(identity, restart)
@@ -53,7 +53,9 @@ class Journal:
         header = MAGIC + json.dumps(identity, sort_keys=True).encode() + b"\n"
         if restart or not self._resumes(identity):
             self._file.truncate(0)
+            self._mine = True
             self._write(header)
+        self._mine = True
         for record in self._scan():
             self._note(record)
         self._file.truncate(self._end)
@@ -65,7 +67,7 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            if not self._places and not isinstance(error, InputError):
+            if self._mine and not self._places:
                 self.path.unlink(missing_ok=True)
             elif self.path.exists():
                 os.fsync(self._file.fileno())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .difference import Difference, difference
 from .domain import Array, Point
 from .export import check_export, export_path
 from .jobs import Job, build_file, shard_of
@@ -40,13 +41,14 @@ def build(
     """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says.
 
     A build into a file goes on where an earlier one of the same was stopped. `job` as `jobs.Job` has it:
-    `restart`, to begin anew; `checkpoint` [s], how often the disk is asked to keep what was found.
+    `restart`, to begin anew; `checkpoint` [s], how often the disk is asked to keep what was found; and
+    `scheduler`, the address of a Dask scheduler, or "local:N", whose workers evaluate.
     """
     resolved = _resolved(scenario, output, overrides)
     if output is None:
         require(not job, f"{', '.join(job)} need an output file; name one")
         return build_roadmap(resolved.problem(), threads, progress)
-    build_file(resolved.problem(), output, threads, progress, job=Job(**job))
+    _build(resolved, output, threads, progress, job)
     return read_roadmap(output)
 
 
@@ -61,8 +63,25 @@ def build_part(
     **job: Any,
 ) -> None:
     """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; else as `build`."""
-    resolved, part = _resolved(scenario, output, overrides), shard_of(shard)
-    build_file(resolved.problem(), output, threads, progress, job=Job(shard=part, **job))
+    _build(_resolved(scenario, output, overrides), output, threads, progress, job | {"shard": shard_of(shard)})
+
+
+def _build(
+    scenario: Scenario,
+    output: str | File,
+    threads: int | None,
+    progress: Callable[[Progress], None],
+    job: dict[str, Any],
+) -> None:
+    address = job.pop("scheduler", None)
+    if address is None:
+        build_file(scenario.problem(), output, threads, progress, job=Job(**job))
+        return
+    from .cluster import scheduler
+
+    with scheduler(address) as cluster:
+        job |= {"finder": cluster.find_edges, "warm": False}
+        build_file(scenario.problem(), output, threads, progress, job=Job(**job))
 
 
 def _resolved(scenario: str | File | Scenario, output: str | File | None, overrides: Sequence[str]) -> Scenario:
@@ -86,6 +105,11 @@ def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
 def info(roadmap: str | File | Roadmap) -> Roadmap:
     """A roadmap from its file; printed, it says what it is."""
     return roadmap if isinstance(roadmap, Roadmap) else read_roadmap(roadmap)
+
+
+def differ(first: str | File | Roadmap, second: str | File | Roadmap) -> Difference:
+    """What two roadmaps differ in; printed, it says so."""
+    return difference(info(first), info(second))
 
 
 def query(

@@ -24,14 +24,15 @@ NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 
 
 def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
-    """InputError unless flow and glider are those that the roadmap was built with."""
+    """InputError unless flow, terrain and glider are those that the roadmap was built with."""
     made = roadmap.provenance
     for name, digest, now in (
         ("flow", made.flow_sha256, flow_sha256(problem.evaluator.flow)),
+        ("terrain", made.terrain_sha256, flow_sha256(problem.evaluator.terrain)),
         ("glider", made.glider_sha256, glider_sha256(problem.evaluator.polar)),
     ):
         require(
-            digest == now,
+            digest in ("", now),  # earlier versions of the program did not say the terrain's
             f"the {name} has changed since the roadmap was built (its digest was {digest[:12]}, it is "
             f"{now[:12]} now); build the roadmap again",
         )

@@ -238,7 +238,9 @@ class Roadmap:
             f"  flow:   {self.provenance.flow}\n"
             f"  glider: {self.provenance.glider}\n"
             f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
-            f"{self.provenance.created}"
+            f"{self.provenance.created}\n"
+            f"  by:     glider-stream {self.provenance.software_version}"
+            + "".join(f", {words}" for words in (self.provenance.libraries, self.provenance.machine) if words)
         )
 
 

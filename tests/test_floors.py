@@ -18,9 +18,9 @@ FLOORS = {
     " errors settings threads hdf5",
     4: "bins glider flow domain frame ocean terrain brute_force",
     5: "sampling neighbours edges legs",
-    6: "roadmap path waypoints",
+    6: "roadmap path waypoints difference",
     7: "lock store journal query",
-    8: "slocum seaglider export plot progress describe verify jobs baselines",
+    8: "slocum seaglider export plot progress describe verify cluster jobs baselines",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

@@ -13,9 +13,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from small import roadmap, scenario_file
+from small import command, roadmap, scenario_file, strict_json
 
-from glider_stream import jobs, store
+from glider_stream import jobs, planner, store
+from glider_stream.difference import difference
 from glider_stream.errors import InputError
 from glider_stream.flow import flow_sha256
 from glider_stream.glider import glider_sha256
@@ -255,3 +256,26 @@ def test_a_damaged_file_never_passes_unseen(file):
 
 def test_a_roadmap_is_read_without_its_scenario_file(file):
     assert scenario_from_text(read_roadmap(file).provenance.scenario) == read_scenario(scenario_file(file.parent))
+
+
+def test_what_differs_between_two_roadmaps(tmp_path, capsys):
+    road = roadmap()
+    assert difference(road, road).same_edges
+    later = replace(road, time=road.time + np.where(np.arange(road.time.size) == 7, 0.25, 0.0))
+    changed = difference(road, later)
+    assert changed.edges == (0, 0, road.target.size)
+    assert changed.times == (0.25, 1)
+    fewer = planner.build(scenario_file(tmp_path), tmp_path / "fewer.h5", overrides=["neighbours.k=15"])
+    write_roadmap(road, tmp_path / "road.h5")
+    said = command(capsys, "info", tmp_path / "road.h5", "--diff", tmp_path / "fewer.h5")
+    assert said.code == 0
+    assert "< k = 20" in said.out
+    assert "> k = 15" in said.out
+    told = strict_json(
+        command(capsys, "info", tmp_path / "road.h5", "--diff", tmp_path / "fewer.h5", "--json").out
+    )
+    assert told["edges"]["only_first"] == road.target.size - told["edges"]["both"]
+    assert told["edges"]["only_second"] == fewer.target.size - told["edges"]["both"]
+    assert not told["same_edges"]
+    other = planner.build(scenario_file(tmp_path), overrides=["sampling.shape=[4,4,3]"])
+    assert difference(road, other).edges is None

@@ -1,0 +1,140 @@
+"""Builds on a cluster: the same chunks of nodes, evaluated by the workers of a Dask scheduler."""
+
+import contextlib
+import importlib
+import os
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import Array, Index
+from .errors import InputError
+from .kernels.cache import KERNEL_DIGEST
+from .roadmap import Edges, Problem, find_edges, warm_up
+from .settings import require
+from .threads import threads
+
+AHEAD = 4
+"""Chunks that wait at the scheduler for each thread of a worker."""
+TRIES = 10
+"""Workers that a chunk may lose before it is held for their end."""
+WAIT = 60.0
+"""Seconds to wait for a scheduler and for its first worker."""
+_ONE_AT_A_TIME = threading.Lock()
+"""Kernels use all the threads of a worker's process: a worker with several of Dask's takes turns."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a worker needs to evaluate any nodes: the problem, its nodes (n, 3) [m], who sent it."""
+
+    problem: Problem
+    position: Array
+    threads: int | None
+    software: dict[str, str]
+
+
+def software() -> dict[str, str]:
+    """What must be the same everywhere for the same bits."""
+    return {"kernels": KERNEL_DIGEST} | {
+        name: version(name) for name in ("glider-stream", "numpy", "numba", "scipy")
+    }
+
+
+def check_software(asked: dict[str, str]) -> None:
+    """InputError, in a worker, unless it has what was asked for."""
+    unlike = [
+        f"{name} {own} and not {asked.get(name)}" for name, own in software().items() if own != asked.get(name)
+    ]
+    require(not unlike, f"a worker has {', '.join(unlike)}; install the same there")
+
+
+def evaluate(work: Work, source: NDArray[np.int64]) -> Edges:
+    """The edges from some nodes; what a worker runs."""
+    check_software(work.software)
+    with _ONE_AT_A_TIME, threads(work.threads):
+        warm_up(work.problem)
+        [edges] = find_edges(work.problem, work.position, source, batch_pairs=2**62)
+        return edges
+
+
+def _distributed() -> Any:
+    try:
+        return importlib.import_module("distributed")
+    except ImportError:
+        raise InputError("--scheduler needs Dask distributed: pip install glider-stream[dask]") from None
+
+
+@contextlib.contextmanager
+def scheduler(address: str) -> Iterator["Cluster"]:
+    """A Dask scheduler at an address, or "local:N": N worker processes here, for as long as the block runs."""
+    distributed = _distributed()
+    own = re.fullmatch(r"local:(\d{1,4})", address)
+    if own is None:
+        require(
+            ":" in address, f"a scheduler is tcp://HOST:PORT, or local:N for N processes here; got {address!r}"
+        )
+        try:
+            with distributed.Client(address, timeout=WAIT) as client:
+                yield Cluster(client, None)
+        except (OSError, TimeoutError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            said = " ".join(str(error).split())[:200]
+            raise InputError(f"no Dask scheduler answers at {address} ({said}); start one, or mend it") from None
+        return
+    count = int(own.group(1))
+    require(count >= 1, f"a local cluster has 1 worker or more; got {address!r}")
+    each = max(1, (os.cpu_count() or 1) // count)
+    with (
+        distributed.LocalCluster(
+            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield Cluster(client, each)
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A client of a scheduler; `threads` of each worker's kernels, all of its machine's if None."""
+
+    client: Any
+    threads: int | None
+
+    def find_edges(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
+        """As `roadmap.find_edges`, but in the order in which chunks are done; a lost worker's are done again."""
+        self.client.wait_for_workers(1, timeout=WAIT)
+        # degrees are made here, where the scenario is; a frame need not travel
+        work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
+        sent = self.client.scatter(work, broadcast=True, hash=False)
+        size = max(1, batch_pairs // problem.legs(position).pairs_per_node)
+        chunks = iter(np.array_split(source, range(size, len(source), size)))
+
+        def submit() -> Any | None:
+            chunk = next(chunks, None)
+            return None if chunk is None else self.client.submit(evaluate, sent, chunk, pure=False, retries=TRIES)
+
+        room = AHEAD * max(1, sum(self.client.nthreads().values()))
+        waiting = _distributed().as_completed([future for _ in range(room) if (future := submit()) is not None])
+        for future in waiting:
+            try:
+                edges = future.result()
+            except InputError:
+                raise
+            except Exception as error:
+                # what a worker's death, or a broken network, raises is not written down anywhere
+                said = " ".join(str(error).split())[:300] or type(error).__name__
+                raise InputError(
+                    f"a chunk failed on the cluster: {said}; give the same command to go on"
+                ) from None
+            following = submit()
+            if following is not None:
+                waiting.add(following)
+            yield edges
