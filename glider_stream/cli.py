@@ -58,6 +58,9 @@ def cli() -> None:
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
 @click.option("--shard", metavar="K/N", help="Build part K of N alone, for `merge`.")
 @click.option("--restart", is_flag=True, help="Forget what a stopped build has kept, and begin anew.")
+@click.option(
+    "--from", "base", type=FILE, metavar="OLD", help="Take over what a new current cannot have changed."
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Evaluate on a Dask cluster; local:N for N processes here.")
 @click.option(
     "--checkpoint", type=float, metavar="SECONDS", help="How often the disk must keep it; 30 if not given."
@@ -69,6 +72,7 @@ def build(
     overrides: tuple[str, ...],
     shard: str | None,
     restart: bool,
+    base: Path | None,
     scheduler: str | None,
     checkpoint: float | None,
 ) -> None:
@@ -79,7 +83,7 @@ def build(
     from . import planner
     from .progress import reporter
 
-    given = {"scheduler": scheduler, "checkpoint": checkpoint}
+    given = {"base": base, "scheduler": scheduler, "checkpoint": checkpoint}
     job = {name: value for name, value in given.items() if value is not None}
     run: dict[str, Any] = {"threads": threads, "overrides": overrides, "restart": restart, **job}
     with reporter("build") as progress:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .change import untouched
 from .difference import Difference, difference
 from .domain import Array, Point
 from .export import check_export, export_path
@@ -42,7 +43,8 @@ def build(
 
     A build into a file goes on where an earlier one of the same was stopped. `job` as `jobs.Job` has it:
     `restart`, to begin anew; `checkpoint` [s], how often the disk is asked to keep what was found; and
-    `scheduler`, the address of a Dask scheduler, or "local:N", whose workers evaluate.
+    `scheduler`, the address of a Dask scheduler, or "local:N", whose workers evaluate; `base`, an older
+    roadmap of the same nodes in another current, of which what that cannot have touched is taken over.
     """
     resolved = _resolved(scenario, output, overrides)
     if output is None:
@@ -73,15 +75,21 @@ def _build(
     progress: Callable[[Progress], None],
     job: dict[str, Any],
 ) -> None:
-    address = job.pop("scheduler", None)
+    address, older = job.pop("scheduler", None), job.pop("base", None)
+    problem = scenario.problem()
+    if older is not None:
+        road = info(older)
+        before = scenario_from_text(road.provenance.scenario).problem()
+        check_unchanged(road, before)
+        job["base"] = road, untouched(road, before, problem)
     if address is None:
-        build_file(scenario.problem(), output, threads, progress, job=Job(**job))
+        build_file(problem, output, threads, progress, job=Job(**job))
         return
     from .cluster import scheduler
 
     with scheduler(address) as cluster:
         job |= {"finder": cluster.find_edges, "warm": False}
-        build_file(scenario.problem(), output, threads, progress, job=Job(**job))
+        build_file(problem, output, threads, progress, job=Job(**job))
 
 
 def _resolved(scenario: str | File | Scenario, output: str | File | None, overrides: Sequence[str]) -> Scenario:

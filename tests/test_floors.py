@@ -19,7 +19,7 @@ FLOORS = {
     4: "bins glider flow domain frame ocean terrain brute_force",
     5: "sampling neighbours edges legs",
     6: "roadmap path waypoints difference",
-    7: "lock store journal query",
+    7: "lock store journal query change",
     8: "slocum seaglider export plot progress describe verify cluster jobs baselines",
     9: "scenario bench suite planner cli",
 }

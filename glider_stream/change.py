@@ -1,0 +1,191 @@
+"""A change of the water: which nodes of an older roadmap it cannot have touched."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, map_coordinates, maximum_filter
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from .edges import FlowMapMethod
+from .kernels.flow import Flow, Grid, OceanGrid
+from .kernels.terrain import Seabed
+from .legs import NeighbourLegs
+from .roadmap import Problem, Roadmap, node_positions, provenance_of
+from .settings import require
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SIDE = 480
+"""Cells along the longer side of the lattice that times are bounded on."""
+DETOUR = 1.0824
+"""A way over eight neighbours is at most so much longer than the straight one: 1 / cos(22.5 degrees)."""
+STEPS = 17
+"""Steps in which the speeds of cells are told apart."""
+VALUES = {"values", "max_speed", "level_speed", "level_carry", "bottom"}
+"""What may differ of two flows, or seabeds, on one grid."""
+
+
+def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
+    """Which nodes (n,) keep all that `old` says of their edges and pairs, though the flow has changed.
+
+    No path from such a node meets the changed water within the horizon: not even one that is carried along
+    by the fastest current of each place. InputError where more has changed than the water.
+    """
+    position = node_positions(now)
+    made, wanted = old.provenance, provenance_of(now, position)
+    what = {
+        "nodes": (made.nodes_sha256, wanted.nodes_sha256),
+        "glider": (made.glider_sha256, wanted.glider_sha256),
+        "kernels": (made.kernel_digest, wanted.kernel_digest),
+        "steering": (before.evaluator.steering, now.evaluator.steering),
+        "integration": (before.evaluator.integration, now.evaluator.integration),
+        "neighbours": (before.law, now.law),
+        "departure": (before.departure, now.departure),
+    }
+    unlike = [name for name, (one, other) in what.items() if one != other]
+    require(
+        not unlike, f"the older roadmap has other {', '.join(unlike)}, and not only another flow; build afresh"
+    )
+    require(old.node_counts is not None, "the older roadmap does not count the pairs of each node; build afresh")
+    lattice = _Lattice(before, now, position)
+    changed = lattice.changed()
+    if changed is None:
+        return np.zeros(len(position), dtype=bool)
+    if not changed.any():
+        return np.ones(len(position), dtype=bool)
+    return lattice.away_from(changed)
+
+
+def _same(one: Any, other: Any) -> bool:
+    return other is not None and np.array_equal(one, other)
+
+
+class _Lattice:
+    """Even cells over all the water that paths from the nodes can see."""
+
+    def __init__(self, before: Problem, now: Problem, position: Array) -> None:
+        self.before, self.now, self.position = before, now, position
+        integration = now.evaluator.integration
+        self.horizon = integration.dt * integration.steps
+        self.glide = float(now.evaluator.polar.best_horizontal.max())
+        self.flows: tuple[Flow, Flow] = before.evaluator.flow, now.evaluator.flow
+        self.fastest = max(flow.max_speed for flow in self.flows)
+        low, high = position[:, :2].min(axis=0), position[:, :2].max(axis=0)
+        reach = (self.glide + self.fastest) * self.horizon
+        # beyond the flow itself no path goes on
+        box = (
+            np.array([self.flows[1].x_lo, self.flows[1].y_lo]),
+            np.array([self.flows[1].x_hi, self.flows[1].y_hi]),
+        )
+        low, high = np.maximum(low - reach, box[0]), np.minimum(high + reach, box[1])
+        self.step = float((high - low).max()) / SIDE
+        self.count = np.maximum(np.ceil((high - low) / self.step).astype(np.int64), 1)
+        self.low = low
+
+    def changed(self) -> Bools | None:
+        """Cells where flow or terrain differ; None where these cannot be compared point by point."""
+        found = np.zeros(tuple(self.count), dtype=bool)
+        terrains = self.before.evaluator.terrain, self.now.evaluator.terrain
+        for one, other in (self.flows, terrains):
+            alike = [name for name in one._fields if _same(getattr(one, name), getattr(other, name, None))]
+            if type(one) is type(other) and len(alike) == len(one._fields):
+                continue
+            if type(one) is not type(other) or not set(one._fields) - set(alike) <= VALUES:
+                return None
+            if isinstance(other, (Grid, OceanGrid)) and isinstance(one, (Grid, OceanGrid)):
+                unlike = self._in_time(other, (one.values != other.values).any(axis=-1))
+                found |= self._touched(other, unlike.any(axis=tuple(range(unlike.ndim - 2))))
+            elif isinstance(other, Seabed) and isinstance(one, Seabed):
+                found |= self._touched(other, one.bottom != other.bottom)
+            else:
+                return None
+        return found
+
+    def _in_time(self, flow: Grid | OceanGrid, values: Any) -> Any:
+        """Of values by time first, those that are read between departure and horizon."""
+        if isinstance(flow, Grid):
+            return values
+        start = self.now.departure
+        first = max(int(np.searchsorted(flow.times, start, side="right")) - 1, 0)
+        return values[first : int(np.searchsorted(flow.times, start + self.horizon)) + 1]
+
+    def _touched(self, grid: Grid | OceanGrid | Seabed, points: Bools) -> Bools:
+        """The cells that read one of the grid's `points` (ni, nj)."""
+        x, y = np.meshgrid(
+            *(self.low[n] + self.step * np.arange(self.count[n] + 1) for n in range(2)), indexing="ij"
+        )
+        at = np.stack([(x - grid.x_lo) * grid.per_x, (y - grid.y_lo) * grid.per_y])
+        if not isinstance(grid, Grid):
+            at = np.stack(
+                [map_coordinates(grid.index_map[..., n], at, order=1, mode="nearest") for n in range(2)]
+            )
+        corners = np.stack([at[:, :-1, :-1], at[:, 1:, :-1], at[:, :-1, 1:], at[:, 1:, 1:]])
+        # a point is read in the cells around it; one more for the bend of a map between corners
+        most = np.array(points.shape)[:, None, None] - 1
+        low = np.clip(np.floor(corners.min(axis=0)).astype(np.int64) - 1, 0, most)
+        high = np.clip(np.ceil(corners.max(axis=0)).astype(np.int64) + 1, 0, most) + 1
+        sums = np.pad(points.astype(np.int64).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+        (i, j), (k, m) = low, high
+        return np.asarray(sums[k, m] - sums[i, m] - sums[k, j] + sums[i, j] > 0)
+
+    def away_from(self, changed: Bools) -> Bools:
+        """Nodes from which no path meets a changed cell within the horizon, and no pair looks into one."""
+        at = np.clip(((self.position[:, :2] - self.low) / self.step).astype(np.int64), 0, self.count - 1)
+        soonest = self._soonest(changed)[at[:, 0], at[:, 1]]
+        safe = soonest > self.horizon
+        straight = not isinstance(self.now.evaluator.steering, FlowMapMethod)
+        # the stream value is read along the straight line
+        gap = distance_transform_edt(~changed)[at[:, 0], at[:, 1]] * self.step - 2 * self.step
+        legs = self.now.legs(self.position)
+        near, far = (
+            (self.glide + speed) * self.horizon for speed in sorted(flow.max_speed for flow in self.flows)
+        )
+        if not isinstance(legs, NeighbourLegs):
+            return np.asarray(safe & (gap > far) if straight else safe)
+        hit = self.now.evaluator.integration.tolerance + 1.0
+        for node in np.flatnonzero(safe):
+            others = self.position[legs.neighbourhood.of(self.position[node]), :2]
+            away = np.linalg.norm(others - self.position[node, :2], axis=1)
+            safe[node] = not straight or gap[node] > away.max(initial=0.0)
+            # which pairs are too far is decided by the fastest current anywhere
+            safe[node] &= near == far or not bool(((away > near - hit) & (away < far + hit)).any())
+        return np.asarray(safe)
+
+    def _soonest(self, changed: Bools) -> Array:
+        """A bound from below [s] on when a path from each cell can meet a changed one: the way's own fastest."""
+        speed = self.glide + maximum_filter(self._speeds(), size=3, mode="nearest")
+        number = np.arange(changed.size).reshape(changed.shape)
+        rows, cols, costs = [], [], []
+        for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            here = (slice(None, -di or None), slice(max(0, -dj), None if dj <= 0 else -dj))
+            there = (slice(di, None), slice(max(0, dj), None if dj >= 0 else dj))
+            between = np.maximum(speed[here], speed[there])
+            rows.append(number[here].ravel())
+            cols.append(number[there].ravel())
+            costs.append((self.step * np.hypot(di, dj) / between).ravel())
+        graph = csr_array(
+            (np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))),
+            shape=(changed.size, changed.size),
+        )
+        time = dijkstra(graph, directed=False, indices=number[changed], min_only=True)
+        # a node, and what it meets, lie anywhere in their cells
+        slack = 1.5 * self.step / float(speed.min())
+        return np.asarray((time / DETOUR - slack).reshape(changed.shape))
+
+    def _speeds(self) -> Array:
+        """The fastest current that is read in each cell, at any depth and time: at most its grid points' own."""
+        flow = self.flows[1]
+        result = np.full(tuple(self.count), flow.max_speed)
+        if not isinstance(flow, (Grid, OceanGrid)):
+            return result
+        speeds = np.hypot(*np.moveaxis(self._in_time(flow, flow.values), -1, 0))
+        fastest = speeds.max(axis=tuple(range(speeds.ndim - 2)))
+        steps = np.quantile(fastest, np.linspace(0, 1, STEPS))
+        result[:] = steps[0]
+        for low, high in pairwise(steps):
+            result[self._touched(flow, fastest > low)] = high
+        return result
