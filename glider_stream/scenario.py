@@ -11,20 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from .domain import BoxDomain, GeographicDomain, Point, domain_from_table
+from .domain import Array, BoxDomain, GeographicDomain, Point, domain_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
 from .errors import InputError
 from .flow import FASTEST, FLOWS, LONGEST, AnalyticFlow, divergence_ratio, is_steady, sample_flow, sampling_error
 from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
-from .kernels.terrain import OpenWater, Terrain
+from .kernels.terrain import OpenWater, Seabed, Terrain
 from .neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .ocean import OceanFlow
+from .ocean.bottom import Bottom
 from .roadmap import Problem
 from .sampling import SAMPLERS, Sampler
 from .settings import from_kinds, from_table, require
+from .terrain import TerrainSettings, raster_terrain
 
-SECTIONS = ("flow", "glider", "domain", "sampling", "neighbours", "steering", "integration", "cost", "query")
+SECTIONS = (
+    "flow",
+    "terrain",
+    "glider",
+    "domain",
+    "sampling",
+    "neighbours",
+    "steering",
+    "integration",
+    "cost",
+    "query",
+)
+OPTIONAL = ("terrain", "query")
 
 
 @dataclass(frozen=True)
@@ -33,6 +47,8 @@ class TravelTime:
 
 
 COSTS: dict[str, type[TravelTime]] = {"time": TravelTime}
+FILES = {"file", "bathymetry", "keep_out"}
+"""Keys whose values name files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
     "sampling": ("kind", SAMPLERS),
@@ -62,6 +78,7 @@ class Scenario:
 
     domain: BoxDomain | GeographicDomain
     flow: AnalyticFlow | OceanFlow
+    terrain: TerrainSettings
     glider: Glider
     sampler: Sampler
     law: NeighbourLaw | Reachable
@@ -123,7 +140,11 @@ class Scenario:
                 "a flow from a current file needs a domain in `lon`, `lat` and `depth`; got x, y, z",
             )
             assert isinstance(self.domain, GeographicDomain)
-            return self.flow.waters(self.domain.frame(), self.domain.lon, self.domain.lat, self.domain.depth)
+            domain, frame = self.domain, self.domain.frame()
+            ocean, bottom, said = self.flow.waters(frame, domain.lon, domain.lat, domain.depth)
+            rim = np.array([ocean.x_lo, ocean.y_lo]), np.array([ocean.x_hi, ocean.y_hi])
+            seabed, also = self._grounds(rim, [bottom])
+            return ocean, seabed, f"{said}; {also}"
         lo, hi = self.domain.box()
         flow = self.flow.kernel((lo[2], hi[2]))
         if self.flow.sampled is not None:
@@ -137,7 +158,30 @@ class Scenario:
             off = sampling_error(exact, flow, *box, (lo[2], hi[2]))
             spacing = ", ".join(f"{step:g}" for step in self.flow.sampled)
             words += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
-        return flow, OpenWater(-np.inf), words
+        if self.terrain == TerrainSettings():
+            return flow, OpenWater(-np.inf), words
+        if self.terrain == TerrainSettings(max_depth=self.terrain.max_depth):
+            return flow, OpenWater(-float(self.terrain.max_depth or np.inf)), words
+        wide = (glide + flow.max_speed * horizon) / 2
+        seabed, also = self._grounds((lo[:2] - wide, hi[:2] + wide), [])
+        return flow, seabed, f"{words}; {also}"
+
+    def _grounds(self, box: tuple[Array, Array], bottoms: list[Bottom]) -> tuple[Seabed, str]:
+        """The terrain of a geographic domain over a box [m], of what is known and what is asked for."""
+        require(
+            isinstance(self.domain, GeographicDomain),
+            "[terrain] needs a domain in `lon`, `lat` and `depth`, but for `max_depth`; got x, y, z",
+        )
+        assert isinstance(self.domain, GeographicDomain)
+        domain, frame, asked = self.domain, self.domain.frame(), self.terrain
+        if asked.bathymetry is not None:
+            from .ocean.bathymetry import read_bathymetry
+
+            lo, hi = domain.box()
+            stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
+            words = asked.variable, asked.positive
+            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *words)]
+        return raster_terrain(asked, frame, *box, bottoms)
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -185,14 +229,17 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         require(name in SECTIONS, f"the section `{name}` is not known; choose from: {', '.join(SECTIONS)}")
         require(isinstance(block, Mapping), f"`{name}` must be a section, [{name}]; got {block!r}")
     for name in SECTIONS:
-        require(name in table or name == "query", f"the section [{name}] is missing; add it")
+        require(name in table or name in OPTIONAL, f"the section [{name}] is missing; add it")
     table = {**table, "flow": _located(_dated(table["flow"]), folder)}
+    if "terrain" in table:
+        table["terrain"] = _located(table["terrain"], folder)
     blocks: dict[str, Any] = {
         name: from_kinds(kinds, table[name], name, selector) for name, (selector, kinds) in KINDS.items()
     }
     return Scenario(
         domain=domain_from_table(table["domain"]),
         flow=blocks["flow"],
+        terrain=from_table(TerrainSettings, table.get("terrain", {}), "terrain"),
         glider=glider_from_table(table["glider"]),
         sampler=blocks["sampling"],
         law=blocks["neighbours"],
@@ -209,21 +256,24 @@ def _dated(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value.isoformat() if isinstance(value, date) else value for key, value in table.items()}
 
 
-def _located(flow: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The [flow] table with its file names made absolute."""
-    file = flow.get("file")
-    names = [file] if isinstance(file, str) else file
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        return dict(flow)
-    return {**flow, "file": [str((folder / name).absolute()) for name in names]}
+def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A table with its file names made absolute."""
+    result = dict(table)
+    for key in FILES & set(table):
+        several = not isinstance(table[key], str)
+        names = table[key] if several else [table[key]]
+        if isinstance(names, list) and all(isinstance(name, str) for name in names):
+            found = [str((folder / name).absolute()) for name in names]
+            result[key] = found if several or key != "bathymetry" else found[0]
+    return result
 
 
 def _override(table: dict[str, Any], overrides: Sequence[str]) -> None:
     """Set each section.key=value, and drop the keys of kinds that are no longer chosen."""
     before = {section: _kind_keys(table, section) for section in KINDS}
     given = [_set(table, override) for override in overrides]
-    if ["flow", "file"] in given:
-        table["flow"] = _located(table["flow"], Path())
+    for section, key in (place for place in given if len(place) == 2 and place[1] in FILES):
+        table[section] |= _located({key: table[section][key]}, Path())
     for section, keys in before.items():
         for key in keys - _kind_keys(table, section):
             if key in table[section] and not any(place[:2] == [section, key] for place in given):

@@ -445,7 +445,7 @@ FRAME = LocalFrame.over(*DOMAIN[:2])
 
 def test_the_flow_of_a_domain(tmp_path):
     file = read_currents(written(tmp_path, dataset()))
-    flow, seabed = ocean_flow(file, FRAME, *DOMAIN, "2023-02-27T03:00:00Z", clearance=5.0)
+    flow, seabed = ocean_flow(file, FRAME, *DOMAIN, "2023-02-27T03:00:00Z")
     assert (flow.t_lo, flow.t_hi) == (-3 * 3600, 21 * 3600)
     assert flow.values.shape[2:4] == (10, 13)
     assert flow.length_scale == pytest.approx(5500, rel=0.02)
@@ -461,9 +461,9 @@ def test_the_flow_of_a_domain(tmp_path):
         assert allowed(seabed, x, y, -depth)
     x, y = (float(part) for part in FRAME.to_local(20.1, 60.4))
     assert not contains(flow, x, y, 0.0)
-    # the last level's cell reaches as far down as up: 200 + 60 m, less the clearance
-    assert allowed(seabed, 0.0, 0.0, -254.9)
-    assert not allowed(seabed, 0.0, 0.0, -255.1)
+    # the last level's cell reaches as far down as up: 200 + 60 m
+    assert allowed(seabed, 0.0, 0.0, -259.9)
+    assert not allowed(seabed, 0.0, 0.0, -260.1)
 
 
 def test_the_planner_and_the_sample_read_the_same(tmp_path):
@@ -631,10 +631,11 @@ def test_describe_says_what_was_taken_and_read(tmp_path):
 
 def test_the_scenario_block(tmp_path):
     path = written(tmp_path, dataset())
-    flow, seabed, words = OceanFlow((str(path),), clearance=10.0, epoch=str(START)).waters(FRAME, *DOMAIN)
+    flow, bottom, words = OceanFlow((str(path),), epoch=str(START)).waters(FRAME, *DOMAIN)
     x = velocity(flow, 0.0, 0.0, -47.0, 15 * 3600.0)
     assert x == pytest.approx(current(FRAME.lon, FRAME.lat, 47.0, 15.0), abs=TOLERANCE)
-    assert seabed.clearance == 10.0
+    assert bottom.height.shape == bottom.grid.shape
+    assert (bottom.height == -260.0).all()
     assert "currents.nc" in words
 
 

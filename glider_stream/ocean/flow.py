@@ -11,8 +11,9 @@ from ..frame import MAX_SCALE_ERROR, LocalFrame, Range
 from ..kernels.flow import OceanGrid, velocities
 from ..kernels.terrain import Seabed, allowed
 from ..settings import require
+from .bottom import Bottom
 from .file import OceanFile, parse_time
-from .grid import EVEN, IndexMap, index_map, span
+from .grid import EVEN, Grid, IndexMap, index_map, span
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -154,9 +155,8 @@ def _build(
     lat: Range,
     depth: Range,
     epoch: str | np.datetime64 | None,
-    clearance: float = 0.0,
     margin: int = MARGIN,
-) -> tuple[OceanGrid, Seabed]:
+) -> tuple[OceanGrid, Seabed, Grid]:
     during, seconds = _seconds(file, epoch)
     cut = file.grid.cut(file.name, lon, lat, frame.lon, MARGIN + HALO)
     levels = levels_for(file.name, None if file.surface else file.depth, depth)
@@ -187,42 +187,50 @@ def _build(
         own = -file.seabed[cut.rows][:, cut.columns].T[kept_i, kept_j]
         bottom = np.where(bottom < 0, np.minimum(own, 0.0), 0.0)
     along, across = kept.grid.cell_sizes()
-    return _assemble(
+    flow, seabed = _assemble(
         values,
         -depths[::-1],
         seconds,
         index_map(frame, kept.grid),
         bottom,
         float(min(along.min(), across.min())),
-        clearance,
+        0.0,
     )
+    return flow, seabed, kept.grid
 
 
 def ocean_flow(
-    file: OceanFile,
-    frame: LocalFrame,
-    lon: Range,
-    lat: Range,
-    depth: Range,
-    epoch: str | None = None,
-    clearance: float = 0.0,
+    file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None = None
 ) -> tuple[OceanGrid, Seabed]:
     """The flow and seabed of a domain: `lon`, `lat` [degrees], `depth` [m], with a margin of two cells.
 
-    t = 0 at `epoch` (ISO 8601, UTC), which a file with several times needs. A glider keeps `clearance` [m]
-    above the bottom: the lower face of the deepest wet cell of the nearest column. Above the top level, and
-    at all depths where the file names none, the current is held.
+    t = 0 at `epoch` (ISO 8601, UTC), which a file with several times needs. The bottom is the lower face of
+    the deepest wet cell of the nearest column, or the model's own. Above the top level, and at all depths
+    where the file names none, the current is held.
     """
-    require(clearance >= 0, f"`flow.clearance` must be at least 0 m; got {clearance:g}")
+    return _ocean_flow(file, frame, lon, lat, depth, epoch)[:2]
+
+
+def ocean_waters(
+    file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None = None
+) -> tuple[OceanGrid, Bottom]:
+    """As `ocean_flow`, and the bottom on the file's own grid."""
+    flow, seabed, grid = _ocean_flow(file, frame, lon, lat, depth, epoch)
+    return flow, Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own mask")
+
+
+def _ocean_flow(
+    file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None
+) -> tuple[OceanGrid, Seabed, Grid]:
     require(0 <= depth[0] <= depth[1], f"the domain's depth must rise from 0 or below; got {list(depth)}")
-    flow, seabed = _build(file, frame, lon, lat, depth, epoch, clearance)
+    flow, seabed, grid = _build(file, frame, lon, lat, depth, epoch)
     error = frame.scale_error(lon, lat)
     require(
         error <= MAX_SCALE_ERROR,
         f"the domain is too wide for a flat frame, whose metres would be {100 * error:.1f} % off; narrow it",
     )
     require(bool((seabed.bottom < 0).any()), f"the domain holds no water in {file.name}: every column is land")
-    return flow, seabed
+    return flow, seabed, grid
 
 
 def sample(
@@ -256,7 +264,7 @@ def sample(
             return None
         depth = min(depth, float(file.depth[-1]))
     frame = LocalFrame(at_lon, at_lat)
-    flow, seabed = _build(file, frame, (at_lon, at_lon), (at_lat, at_lat), (depth, depth), when, margin=0)
+    flow, seabed, _ = _build(file, frame, (at_lon, at_lon), (at_lat, at_lat), (depth, depth), when, margin=0)
     x, y = (float(part) for part in frame.to_local(at_lon, at_lat))
     if not allowed(seabed, x, y, -depth):
         return None

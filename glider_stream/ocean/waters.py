@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from ..frame import LocalFrame, Range
 from ..kernels.flow import OceanGrid
-from ..kernels.terrain import Seabed
-from .flow import ocean_flow
+from .bottom import Bottom
+from .flow import ocean_waters
 from .names import Names
 from .reader import read_currents
 
@@ -14,19 +14,18 @@ from .reader import read_currents
 class OceanFlow:
     """The block [flow] of kind "netcdf": `file` or files, the `epoch` (ISO 8601, UTC) of t = 0.
 
-    `clearance` [m] is kept above the seabed; `names` where the file does not speak for itself.
+    `names` where the file does not speak for itself.
     """
 
     file: tuple[str, ...] = field(
         metadata={"missing": "the file of currents, or a list of them, such as --set flow.file=currents.nc"}
     )
-    clearance: float = 0.0
     epoch: str | None = None
     names: Names | None = None
 
-    def waters(self, frame: LocalFrame, lon: Range, lat: Range, depth: Range) -> tuple[OceanGrid, Seabed, str]:
-        """Flow and seabed of a domain, and a word on where they come from."""
+    def waters(self, frame: LocalFrame, lon: Range, lat: Range, depth: Range) -> tuple[OceanGrid, Bottom, str]:
+        """Flow and bottom of a domain, and a word on where they come from."""
         file = read_currents(self.file, self.names, lon=lon, lat=lat, depth=depth)
-        flow, seabed = ocean_flow(file, frame, lon, lat, depth, self.epoch, self.clearance)
+        flow, bottom = ocean_waters(file, frame, lon, lat, depth, self.epoch)
         words = [f"{file.took['u']}, {file.took['v']} of {file.name}", file.time_range, *file.notes]
-        return flow, seabed, "; ".join(words)
+        return flow, bottom, "; ".join(words)
