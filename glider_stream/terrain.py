@@ -20,7 +20,7 @@ from .settings import require
 Array = NDArray[np.float64]
 LAND = 0.0
 """The height [m] of what no glider may enter at any depth."""
-SIDE = 1024
+SIDE = 512
 """Cells of the raster along its longer side, at most."""
 FINEST = 25.0
 """The smallest cells [m]; below, legs are looked at every 5 m."""
@@ -65,10 +65,10 @@ class TerrainSettings:
 class Raster:
     """Even cells of the local frame, each with the highest bottom that any place in it may have."""
 
-    def __init__(self, frame: LocalFrame, low: Array, high: Array, finest: float) -> None:
-        """Cells over the box from `low` to `high` (2,) [m], no smaller than a quarter of `finest` [m]."""
+    def __init__(self, frame: LocalFrame, low: Array, high: Array) -> None:
+        """Cells over the box from `low` to `high` (2,) [m]."""
         self.frame, self.low = frame, low
-        self.step = max(float((high - low).max()) / SIDE, finest / 4, FINEST)
+        self.step = max(float((high - low).max()) / SIDE, FINEST)
         self.count = np.ceil((high - low) / self.step).astype(np.int64) + 1
         self.bottom = np.full(tuple(self.count), -np.inf)
         self.land = np.zeros(tuple(self.count), dtype=bool)
@@ -201,8 +201,7 @@ def raster_terrain(
     settings: TerrainSettings, frame: LocalFrame, low: Array, high: Array, bottoms: Sequence[Bottom]
 ) -> tuple[Seabed, str]:
     """Terrain over a box of the frame, from `low` to `high` (2,) [m], of bottoms and polygons; words on it."""
-    sizes = [float(size.min()) for bottom in bottoms for size in bottom.grid.cell_sizes()]
-    raster = Raster(frame, low, high, min(sizes, default=0.0))
+    raster = Raster(frame, low, high)
     words = []
     for bottom in bottoms:
         raster.add_bottom(bottom)
