@@ -201,8 +201,8 @@ keep_out = ["zones.geojson"]
 preset = "paper"
 
 [domain]
-lon = [12.46, 12.50]
-lat = [55.735, 55.765]
+lon = [12.49, 12.53]
+lat = [55.76, 55.79]
 depth = [0.0, 40.0]
 
 [sampling]
@@ -247,7 +247,7 @@ def ways_of_all_legs(problem, road, spacing=10.0):
 def test_no_leg_touches_what_the_files_close(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written(tmp_path, chart())
-    zone = square(12.49, 55.75, 0.003)
+    zone = square(12.515, 55.775, 0.003)
     zones(tmp_path, zone)
     (tmp_path / "sound.toml").write_text(SCENARIO)
     problem = read_scenario("sound.toml").problem()
@@ -288,7 +288,7 @@ def test_a_scenario_speaks_of_its_terrain(capsys, tmp_path, monkeypatch):
         refused = command(capsys, "build", "sound.toml", "-o", "no.h5", *small, "--set", sets)
         assert (refused.code, words in refused.err) == (2, True), refused.err
     flat = SCENARIO.replace(
-        "lon = [12.46, 12.50]\nlat = [55.735, 55.765]\ndepth", "x = [0.0, 900.0]\ny = [0.0, 900.0]\nz"
+        "lon = [12.49, 12.53]\nlat = [55.76, 55.79]\ndepth", "x = [0.0, 900.0]\ny = [0.0, 900.0]\nz"
     )
     flat = flat.replace("z = [0.0, 40.0]", "z = [-40.0, 0.0]")
     Path("flat.toml").write_text(flat)
