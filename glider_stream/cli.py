@@ -110,13 +110,39 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
 @click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
 @click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
-def query(roadmap: Path, start: Any, goal: Any, outputs: tuple[Path, ...]) -> None:
+@click.option(
+    "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
+)
+@click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
+@JSON
+def query(
+    roadmap: Path,
+    start: Any,
+    goal: Any,
+    outputs: tuple[Path, ...],
+    most_energy: float | None,
+    front: bool,
+    as_json: bool,
+) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
     from . import planner
 
-    path = planner.query(roadmap, start, goal, outputs)
-    click.echo(path, err=not path.found)
-    if not path.found:
+    if front:
+        if outputs or most_energy is not None:
+            raise click.UsageError(
+                "--trade-off goes with neither --output nor --most-energy; leave one of them out"
+            )
+        said: Any
+        corners = planner.trade_off(roadmap, start, goal)
+        said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+    else:
+        path = planner.query(roadmap, start, goal, outputs, most_energy)
+        said, found = path, path.found
+    if as_json:
+        _write_json(said.as_dict())
+    else:
+        click.echo(said, err=not found)
+    if not found:
         sys.exit(1)
 
 

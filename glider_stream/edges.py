@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bins import node_bins
+from .cost import Cost, TravelTime
 from .flow import LONGEST, WIDEST, is_steady
 from .kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
@@ -108,13 +109,14 @@ class IntegrationSettings:
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Everything that decides an edge but its ends: flow, terrain, glide polar, steering, integration."""
+    """Everything that decides an edge but its ends: flow, terrain, glide polar, steering, integration, cost."""
 
     flow: flow.Flow
     terrain: terrain.Terrain
     polar: control.Polar
     steering: Method
     integration: IntegrationSettings
+    cost: Cost = TravelTime()  # noqa: RUF009  (frozen)
 
     def connect(
         self,
@@ -151,6 +153,7 @@ class Evaluator:
             kernel = refine.refine_nodes if refines else connect.connect_nodes
             task = partial(kernel, self.medium, self.steering.kernel(), *pairs, result)
             in_parallel(task, sources.size, NODES_AT_ONCE)
+        result[:, 2] = self.cost.leg(result[:, 1])
         return result
 
     def _connect_by_fan(self, nodes: Array, departs: Array, sources: Index, rows: Index, targets: Index) -> Array:
@@ -223,6 +226,7 @@ class Evaluator:
                 break
             room = int(counts.max())
         rows = found[np.arange(room) < counts[:, None]]
+        rows[:, 3] = self.cost.leg(rows[:, 2])
         first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         return first, rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
 

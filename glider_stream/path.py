@@ -76,7 +76,7 @@ class Path:
     """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
 
     From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
-    `departs` (UTC) where it says when.
+    `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, if that is known.
     """
 
     start: Array
@@ -85,6 +85,8 @@ class Path:
     legs: tuple[Leg, ...]
     lonlat: Array | None = None
     departs: datetime | None = None
+    unit: str = "s"
+    why: str = ""
 
     @property
     def found(self) -> bool:
@@ -103,10 +105,12 @@ class Path:
 
     def as_dict(self) -> dict[str, Any]:
         """As the path file has it."""
+        energy = {"energy_j": self.cost} if self.found and self.unit == "J" else {}
         return {
             "found": self.found,
             "travel_time_s": self.travel_time if self.found else None,
             "cost": self.cost if self.found else None,
+            **energy,
             "legs": [leg.as_dict() for leg in self.legs],
         }
 
@@ -117,10 +121,12 @@ class Path:
             ends = zip(self.lonlat, (self.start, self.goal), strict=True)
             start, goal = (f"({lon:.4f}, {lat:.4f}, {0.0 - z:.6g} m)" for (lon, lat), (_, _, z) in ends)
         if not self.found:
-            return f"no path from {start} to {goal}; more nodes, neighbours or candidates may find one"
+            why = self.why or "more nodes, neighbours or candidates may find one"
+            return f"no path from {start} to {goal}; {why}"
         count = f"{len(self.legs)} leg{'' if len(self.legs) == 1 else 's'}"
         hours = f" ({self.travel_time / 3600:.1f} h)" if self.travel_time >= 7200 else ""
-        title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s{hours}"
+        energy = f", {self.cost / 1000:,.1f} kJ" if self.unit == "J" else ""
+        title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s{hours}{energy}"
         return "\n".join([title, *(f"  {leg}" for leg in self.legs)])
 
 

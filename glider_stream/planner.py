@@ -1,6 +1,8 @@
 """The planner: one call for each command."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from os.path import realpath
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
@@ -19,6 +21,8 @@ from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .settings import require
 from .store import check_output, read_roadmap
+from .trade_off import TradeOff
+from .trade_off import trade_off as find_trade_off
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,21 +129,47 @@ def query(
     start: Point | None = None,
     goal: Point | None = None,
     outputs: Sequence[str | File] = (),
+    most_energy: float | None = None,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
     These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
-    scenario's own start and goal where none are given. Written to each of `outputs`.
+    scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
+    for the fastest of the paths of `trade_off` that uses no more.
     """
     for output in outputs:
         check_export(output)
-    road = info(roadmap)
-    scenario = scenario_from_text(road.provenance.scenario)
-    ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
-    path = Planner(road, scenario.problem()).query(*ends)
+    if most_energy is None:
+        search, ends = _search(roadmap, start, goal)
+        path = search.query(*ends)
+    else:
+        require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
+        front = trade_off(roadmap, start, goal)
+        last = front.paths[-1]
+        why = (
+            f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}" if last.found else ""
+        )
+        path = front.within(most_energy) or replace(last, cost=math.inf, legs=(), why=why)
     for output in outputs:
         export_path(path, output)
     return path
+
+
+def trade_off(roadmap: str | File | Roadmap, start: Point | None = None, goal: Point | None = None) -> TradeOff:
+    """The paths of one query that are best for some price of time against energy; points as in `query`."""
+    search, ends = _search(roadmap, start, goal)
+    unit = search.problem.evaluator.cost.unit
+    require(unit == "J", 'the roadmap\'s cost is time, without energy; build it with [cost] kind = "energy"')
+    return find_trade_off(lambda blend: search.query(*ends, blend=blend))
+
+
+def _search(
+    roadmap: str | File | Roadmap, start: Point | None, goal: Point | None
+) -> tuple[Planner, tuple[Array | None, Array | None]]:
+    road = info(roadmap)
+    scenario = scenario_from_text(road.provenance.scenario)
+    ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
+    return Planner(road, scenario.problem()), (ends[0], ends[1])
 
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":

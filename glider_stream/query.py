@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,10 +49,26 @@ class _End:
 
 
 @dataclass(frozen=True)
+class Blend:
+    """What a search makes least: `cost` times the scenario's own cost, and `time` times seconds."""
+
+    cost: float = 1.0
+    time: float = 0.0
+
+    def of(self, cost: Any, time: Any) -> Any:
+        """The sum of legs."""
+        return self.cost * cost + self.time * time
+
+
+@dataclass(frozen=True)
 class _Search:
-    """The cheapest ways from a start: its number, cost and predecessor of every node, itself the last."""
+    """The cheapest ways from a start: the number, cost and predecessor of every state, the start's the last.
+
+    A state is a node, where turns are free; else a node and how it was come to, by a dive or by a climb.
+    """
 
     start: _End
+    blend: Blend
     origin: int
     cost: Array
     before: NDArray[np.int32]
@@ -65,18 +82,29 @@ class Planner:
         check_unchanged(roadmap, problem)
         self.roadmap = roadmap
         self.problem = problem
+        self._kept: tuple[Blend, Array] | None = None
 
-    def query(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> Path:
+    def query(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        blend: Blend = Blend(),
+    ) -> Path:
         """The cheapest path between two points (3,) [m]; the scenario's own start and goal where None.
 
         A point that is a node is used as it is; any other is attached by its own neighbours, and the leg
-        from end to end is looked at, too.
+        from end to end is looked at, too. `blend` makes another sum the least.
         """
-        return self.queries(start, [goal])[0]
+        return self.queries(start, [goal], blend)[0]
 
-    def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
+    def queries(
+        self,
+        start: ArrayLike | None,
+        goals: Sequence[ArrayLike | None],
+        blend: Blend = Blend(),
+    ) -> list[Path]:
         """The cheapest paths from a point (3,) [m] to each of many, as `query` finds them, by one search."""
-        search = self._search(self._start(start))
+        search = self._search(self._start(start), blend)
         ends = [self._goal(goal) for goal in goals]
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
@@ -86,11 +114,31 @@ class Planner:
         ends = [self._goal(goal) for goal in goals]
         costs = np.empty((len(starts), len(goals)))
         for row, start in zip(costs, starts, strict=True):
-            search = self._search(self._start(start))
+            search = self._search(self._start(start), Blend())
             for m, (end, leg) in enumerate(zip(ends, self._direct(search.start, ends), strict=True)):
-                row[m] = 0.0 if np.array_equal(search.start.point, end.point) else _through(search, end)[0]
-                row[m] = min(row[m], leg.cost if leg.status == Status.CONNECTED else math.inf)
+                here = np.array_equal(search.start.point, end.point)
+                row[m] = 0.0 if here else min(self._through(search, end)[0], self._alone(search, leg))
         return costs
+
+    @property
+    def _turns(self) -> Array | None:
+        """What a turn from dive to climb costs at each node, and at the start; None where turns are free."""
+        return self.problem.evaluator.cost.inflection(self.roadmap.position[:, 2])
+
+    def _turn(self, search: _Search, z: float) -> float:
+        cost = self.problem.evaluator.cost.inflection(z)
+        return 0.0 if cost is None else search.blend.cost * float(cost)
+
+    @property
+    def _unit(self) -> str:
+        return self.problem.evaluator.cost.unit
+
+    def _alone(self, search: _Search, leg: Edge) -> float:
+        """The cost of the leg from end to end; inf where there is none. It begins after a dive, as it were."""
+        if leg.status != Status.CONNECTED:
+            return math.inf
+        turn = self._turn(search, search.start.point[2]) if leg.glide_angle > 0 else 0.0
+        return float(search.blend.of(leg.cost, leg.time)) + turn
 
     @cached_property
     def _legs(self) -> Legs:
@@ -115,25 +163,56 @@ class Planner:
         return np.flatnonzero((self.roadmap.position == place).all(axis=1)), place
 
     @cached_property
-    def _graph(self) -> tuple[Array, NDArray[np.int32], NDArray[np.int32]]:
-        """Cost, target and first edge of each node, with room for the edges of one more, a start."""
-        road, nodes = self.roadmap, len(self.roadmap.position)
-        cost = np.concatenate([road.cost, np.empty(nodes)])
-        target = np.concatenate([road.target, np.empty(nodes, np.int32)])
-        return cost, target, np.append(road.indptr, road.target.size).astype(np.int32)
+    def _graph(self) -> tuple[Index, NDArray[np.int32], NDArray[np.int32], Array | None]:
+        """The edge behind each way between states, the state it leads to, each state's first way, its turn.
 
-    def _search(self, start: _End) -> _Search:
+        The turn's cost is that of a climb from a state that was come to by a dive. There is room for the
+        ways of one more state, a start.
+        """
+        road, turns, nodes = self.roadmap, self._turns, len(self.roadmap.position)
+        room = np.empty(nodes, np.int32)
+        if turns is None:
+            target = np.concatenate([road.target, room])
+            return np.arange(road.target.size), target, np.append(road.indptr, 0).astype(np.int32), None
+        degree = np.repeat(np.diff(road.indptr), 2)
+        first = np.concatenate([[0], np.cumsum(degree)])
+        ways = np.arange(first[-1]) - np.repeat(first[:-1] - np.repeat(road.indptr[:-1], 2), degree)
+        climbs = road.glide_angle[ways] > 0
+        after_dive = np.repeat(np.arange(degree.size) % 2 == 0, degree)
+        turn = np.where(climbs & after_dive, np.repeat(np.repeat(turns, 2), degree), 0.0)
+        target = np.concatenate([(2 * road.target[ways] + climbs).astype(np.int32), room])
+        return ways, target, np.append(first, 0).astype(np.int32), turn
+
+    def _costs(self, blend: Blend) -> Array:
+        """The cost of each way, with room for a start's; the last blend's is kept for the next query."""
+        if self._kept is None or self._kept[0] != blend:
+            ways, _, _, turn = self._graph
+            cost = blend.of(self.roadmap.cost, self.roadmap.time)[ways]
+            cost = cost if turn is None else cost + blend.cost * turn
+            self._kept = blend, np.concatenate([cost, np.empty(len(self.roadmap.position))])
+        return self._kept[1]
+
+    @property
+    def _phases(self) -> int:
+        """How many states a node has."""
+        return 1 if self._graph[3] is None else 2
+
+    def _search(self, start: _End, blend: Blend) -> _Search:
         """Dijkstra's algorithm from a start."""
-        (cost, target, indptr), nodes = self._graph, len(self.roadmap.position)
-        last = first = self.roadmap.target.size
+        (ways, target, indptr, turn), cost = self._graph, self._costs(blend)
+        states, first, last = len(indptr) - 2, len(ways), len(ways)
+        origin = int(start.nodes[0]) * self._phases if start.nodes.size else states
         if start.legs is not None:
-            last += start.legs.nodes.size
-            cost[first:last], target[first:last] = start.legs.outcomes[:, 2], start.legs.nodes
+            rows, to = start.legs.outcomes, start.legs.nodes
+            own, climbs, last = blend.of(rows[:, 2], rows[:, 1]), rows[:, 3] > 0, last + to.size
+            pump = self.problem.evaluator.cost.inflection(start.point[2])
+            if turn is not None and pump is not None:
+                own, to = own + blend.cost * np.where(climbs, pump, 0.0), 2 * to + climbs
+            cost[first:last], target[first:last] = own, to
         indptr[-1] = last
-        origin = int(start.nodes[0]) if start.nodes.size else nodes
-        graph = csr_array((cost[:last], target[:last], indptr), shape=(nodes + 1, nodes + 1))
+        graph = csr_array((cost[:last], target[:last], indptr), shape=(states + 1, states + 1))
         distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
-        return _Search(start, origin, distance[0], before[0])
+        return _Search(start, blend, origin, distance[0], before[0])
 
     def _direct(self, start: _End, goals: Sequence[_End]) -> list[Edge]:
         """The legs from end to end; between nodes the roadmap has said what there is."""
@@ -150,28 +229,47 @@ class Planner:
         """The path to a goal, by nodes or directly."""
         start_at, goal_at = search.start.point, goal.point
         if np.array_equal(start_at, goal_at):
-            return self._path(start_at, goal_at, 0.0, [])
-        cost, nearest = _through(search, goal)
-        if direct.status == Status.CONNECTED and direct.cost < cost:
-            return self._path(start_at, goal_at, direct.cost, [(start_at, goal_at, direct)])
+            return self._path(start_at, goal_at, [])
+        cost, state, leg = self._through(search, goal)
+        if self._alone(search, direct) < cost:
+            return self._path(start_at, goal_at, [(start_at, goal_at, direct)])
         if not math.isfinite(cost):
-            return self._path(start_at, goal_at, math.inf, [])
+            return Path(start_at, goal_at, math.inf, (), self._lonlat(start_at, goal_at), self.problem.departs)
         hops: list[tuple[Array, Array, Edge]] = []
-        end = int(goal.nodes[nearest] if goal.legs is None else goal.legs.nodes[nearest])
-        if goal.legs is not None:
-            hops.append((self._where(search, end), goal_at, _edge(goal.legs.outcomes[nearest])))
-        while end != search.origin:
-            earlier = int(search.before[end])
+        if leg is not None:
+            hops.append((self._where(search, state), goal_at, leg))
+        while state != search.origin:
+            earlier = int(search.before[state])
             hops.append(
-                (self._where(search, earlier), self._where(search, end), self._edge(search, earlier, end))
+                (self._where(search, earlier), self._where(search, state), self._edge(search, earlier, state))
             )
-            end = earlier
-        return self._path(start_at, goal_at, cost, hops[::-1])
+            state = earlier
+        return self._path(start_at, goal_at, hops[::-1])
 
-    def _where(self, search: _Search, node: int) -> Array:
+    def _through(self, search: _Search, goal: _End) -> tuple[float, int, Edge | None]:
+        """The least cost of a way to a goal by nodes, inf where there is none; its last state, and a last leg."""
+        phases = self._phases
+        nodes = goal.nodes if goal.legs is None else goal.legs.nodes
+        states = (phases * nodes[:, None] + np.arange(phases)).ravel()
+        costs = search.cost[states]
+        if goal.legs is not None:
+            rows = np.repeat(goal.legs.outcomes, phases, axis=0)
+            costs = costs + search.blend.of(rows[:, 2], rows[:, 1])
+            if self._turns is not None:
+                turn = (rows[:, 3] > 0) & (states % 2 == 0)
+                costs = costs + search.blend.cost * np.where(turn, self._turns[states // 2], 0.0)
+        if not costs.size or not math.isfinite(costs.min()):
+            return math.inf, 0, None
+        best = int(np.argmin(costs))
+        leg = None if goal.legs is None else _edge(goal.legs.outcomes[best // phases])
+        return float(costs[best]), int(states[best]), leg
+
+    def _where(self, search: _Search, state: int) -> Array:
+        node = state // self._phases
         return search.start.point if node == len(self.roadmap.position) else self.roadmap.position[node]
 
-    def _edge(self, search: _Search, source: int, target: int) -> Edge:
+    def _edge(self, search: _Search, earlier: int, later: int) -> Edge:
+        source, target = earlier // self._phases, later // self._phases
         if source == len(self.roadmap.position):
             assert search.start.legs is not None
             return _edge(search.start.legs.outcomes[np.flatnonzero(search.start.legs.nodes == target)[0]])
@@ -179,7 +277,16 @@ class Planner:
         n = int(self.roadmap.indptr[source] + np.flatnonzero(self.roadmap.target[row] == target)[0])
         return Edge(int(Status.CONNECTED), *(float(getattr(self.roadmap, name)[n]) for name in EDGE_FIELDS))
 
-    def _path(self, start: Array, goal: Array, cost: float, hops: list[tuple[Array, Array, Edge]]) -> Path:
+    def _cost(self, hops: list[tuple[Array, Array, Edge]]) -> float:
+        """The scenario's own cost of some legs, their turns included."""
+        dived, turns = True, 0.0
+        for source, _, edge in hops:
+            climbs = edge.glide_angle > 0
+            turn = self.problem.evaluator.cost.inflection(source[2]) if climbs and dived else None
+            turns, dived = turns + (0.0 if turn is None else float(turn)), not climbs
+        return sum(edge.cost for _, _, edge in hops) + turns
+
+    def _path(self, start: Array, goal: Array, hops: list[tuple[Array, Array, Edge]]) -> Path:
         legs, clock = [], 0.0
         for source, target, edge in hops:
             rows = self.problem.evaluator.trace(source, edge, self.problem.departure)
@@ -188,7 +295,8 @@ class Planner:
             where = self._lonlat(source, target), self._lonlat(*rows[:, 1:]), self._north(source)
             legs.append(Leg(source, target, *control, clock, edge.time, edge.miss, rows, *where))
             clock += edge.time
-        return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs)
+        cost = self._cost(hops)
+        return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs, self._unit)
 
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
@@ -201,15 +309,6 @@ class Planner:
             return 0.0
         east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
         return math.atan2(east, north)
-
-
-def _through(search: _Search, goal: _End) -> tuple[float, int]:
-    """The least cost of a way to a goal by nodes, inf where there is none, and which of its nodes is last."""
-    costs = search.cost[goal.nodes]
-    if goal.legs is not None:
-        costs = search.cost[goal.legs.nodes] + goal.legs.outcomes[:, 2]
-    nearest = int(np.argmin(costs)) if costs.size else 0
-    return (float(costs[nearest]) if costs.size else math.inf), nearest
 
 
 def _connected(attached: Attached) -> Attached:

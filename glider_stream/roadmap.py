@@ -108,6 +108,7 @@ class Provenance:
     nodes_sha256: str = ""
     libraries: str = ""
     machine: str = ""
+    cost_unit: str = "s"
 
     def identity(self) -> dict[str, str]:
         """What two roadmaps, or parts of one, must share to hold the same edges."""
@@ -365,6 +366,7 @@ def provenance_of(problem: Problem, position: Array) -> Provenance:
         seed=problem.sampler.seed,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         software_version=version("glider-stream"),
+        cost_unit=problem.evaluator.cost.unit,
         libraries=", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
         machine=f"{platform.node()}, {platform.machine()}, Python {platform.python_version()}",
     )

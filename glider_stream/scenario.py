@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .cost import Cost, Energy, TravelTime, energy_from_table
 from .domain import Array, BoxDomain, GeographicDomain, Point, domain_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
 from .errors import InputError
@@ -41,12 +42,7 @@ SECTIONS = (
 OPTIONAL = ("terrain", "query")
 
 
-@dataclass(frozen=True)
-class TravelTime:
-    """An edge costs the time that it takes [s]."""
-
-
-COSTS: dict[str, type[TravelTime]] = {"time": TravelTime}
+COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
 FILES = {"file", "bathymetry", "keep_out"}
 """Keys whose values name files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
@@ -84,7 +80,7 @@ class Scenario:
     law: NeighbourLaw | Reachable
     method: Method
     integration: IntegrationSettings
-    cost: TravelTime
+    cost: Cost
     query: QueryPoints | None
     text: str
 
@@ -104,7 +100,7 @@ class Scenario:
         if not is_steady(flow):
             words += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
         return Problem(
-            evaluator=Evaluator(flow, terrain, table, self.method, self.integration),
+            evaluator=Evaluator(flow, terrain, table, self.method, self.integration, self.cost),
             sampler=self.sampler,
             law=self.law,
             lo=lo,
@@ -231,6 +227,8 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
     for name in SECTIONS:
         require(name in table or name in OPTIONAL, f"the section [{name}] is missing; add it")
     table = {**table, "flow": _located(_dated(table["flow"]), folder)}
+    if table["cost"].get("kind") == "energy":
+        table["cost"] = energy_from_table(table["cost"])
     if "terrain" in table:
         table["terrain"] = _located(table["terrain"], folder)
     blocks: dict[str, Any] = {

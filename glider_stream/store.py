@@ -32,7 +32,7 @@ _DESCRIBED = {
     "edges/indptr": ("i8", "1", "first edge of each source node, CSR"),
     "edges/target": ("i4", "1", "target node"),
     "edges/time": ("f8", "s", "time from departure to closest approach"),
-    "edges/cost": ("f8", "s", "cost of the leg: travel time"),
+    "edges/cost": ("f8", "", "cost of the leg: its travel time, or the energy that it takes"),
     "edges/glide_angle": ("f8", "rad", "glide angle through water, negative dives"),
     "edges/heading": ("f8", "rad", "heading through water, counter-clockwise from east"),
     "edges/speed": ("f8", "m s-1", "speed through water along the glide path"),
@@ -165,6 +165,7 @@ class RoadmapWriter:
     ) -> None:
         """Write what is known before the edges are."""
         self._disk, self._file = disk, file
+        self._unit = made.cost_unit
         self._waiting: list[Edges] = []
         self._degree: list[Array] = []
         self._counts: list[Array] = []
@@ -208,6 +209,7 @@ class RoadmapWriter:
         self._put("edges/target", np.concatenate([np.empty(0, np.int32), *(one.target for one in waiting)]))
         for n, name in enumerate(EDGE_FIELDS):
             self._put(f"edges/{name}", values[:, n])
+        self._file["edges/cost"].attrs["units"] = self._unit
         self._file.flush()
         self._disk.check()
 
@@ -403,5 +405,7 @@ def _effort(file: h5py.File, path: Path) -> tuple[float, int]:
 
 def _provenance(file: h5py.File) -> Provenance:
     said = file.attrs
-    words = {f.name: said[f.name] if f.default is MISSING else said.get(f.name, "") for f in fields(Provenance)}
+    words = {
+        f.name: said[f.name] if f.default is MISSING else said.get(f.name, f.default) for f in fields(Provenance)
+    }
     return Provenance(seed=int(words.pop("seed")), **{name: str(value) for name, value in words.items()})

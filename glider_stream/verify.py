@@ -173,7 +173,7 @@ def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Veri
     looks = {
         "lead to where they begin or to the same depth": (rise == 0) | (source == target),
         "climb where they should dive, or dive": np.sign(rise) != np.sign(road.glide_angle),
-        "cost something else than their time": road.cost != road.time,
+        "cost something else than the scenario says": road.cost != evaluator.cost.leg(road.time),
         "take no time or longer than the horizon": (road.time <= 0)
         | (road.time > horizon + evaluator.integration.dt),
         "have a glide angle outside the polar": (angle < polar.shallowest[direction] - 1e-9)

@@ -68,7 +68,7 @@ SCENARIOS = {
     "a key twice": ("k = 20", "k = 20\nk = 21", "small.toml", "TOML"),
     "an endless number": ("k = 20", "k = " + "9" * 5000, "small.toml", "TOML"),
     "nested without end": ("k = 20", "k = " + "[" * 5000, "small.toml", "TOML"),
-    "unknown section": ("[cost]", "[costs]", "`costs`", "choose from: flow, glider"),
+    "unknown section": ("[cost]", "[costs]", "`costs`", "choose from: flow, terrain, glider"),
     "no cost": ('[cost]\nkind = "time"', "", "[cost] is missing; add it"),
     "a value before all sections": ("[flow]", "cost = 3\n[flow]", "small.toml", "TOML"),
     "unknown key": (

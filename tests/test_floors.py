@@ -16,11 +16,11 @@ FLOORS = {
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine"
     " errors settings threads hdf5",
-    4: "bins glider flow domain frame ocean terrain brute_force",
+    4: "cost bins glider flow domain frame ocean terrain brute_force",
     5: "sampling neighbours edges legs",
     6: "roadmap path waypoints difference",
     7: "lock store journal query change",
-    8: "slocum seaglider export plot progress describe verify cluster jobs baselines",
+    8: "trade_off slocum seaglider export plot progress describe verify cluster jobs baselines",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

@@ -138,7 +138,9 @@ def test_many_goals_from_one_search_and_a_table_are_the_single_queries(router, m
     single = [[router.query(start, goal) for goal in goals] for start in starts]
     searches = []
     search = Planner._search
-    monkeypatch.setattr(Planner, "_search", lambda self, start: searches.append(start) or search(self, start))
+    monkeypatch.setattr(
+        Planner, "_search", lambda self, start, blend: searches.append(start) or search(self, start, blend)
+    )
     for start, paths in zip(starts, single, strict=True):
         assert [path.as_dict() for path in router.queries(start, goals)] == [path.as_dict() for path in paths]
     table = router.table(starts, goals)

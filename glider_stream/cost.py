@@ -1,0 +1,92 @@
+"""What legs cost: travel time, or energy."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .settings import require
+
+Array = NDArray[np.float64]
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class TravelTime:
+    """A leg costs the time that it takes [s], and an inflection nothing."""
+
+    unit: ClassVar[str] = "s"
+
+    def leg(self, time: ArrayLike) -> Array:
+        """The cost of legs of some duration [s]; it rises with it, so the fastest control is the cheapest."""
+        return np.asarray(time, np.float64)
+
+    def inflection(self, z: ArrayLike) -> Array | None:
+        """What a turn from dive to climb costs at heights z [m]; None where turns are free."""
+        return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Energy:
+    """A leg costs what the vehicle uses [J]: E = P T + E_trim, and rho g |z| dV / eta(z) where it inflates.
+
+    `hotel` P [W]; `trim` E_trim [J] of a leg's change of trim; `volume` dV [cc] pumped against the pressure
+    of the depth |z| where a dive turns into a climb; `efficiency` eta of the pump, pairs of depth [m] and
+    share, straight between them and held beyond; `density` rho [kg/m^3].
+    """
+
+    unit: ClassVar[str] = "J"
+    hotel: float
+    trim: float
+    volume: float
+    efficiency: tuple[tuple[float, float], ...]
+    density: float
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("hotel", "trim", "volume", "density"):
+            value = getattr(self, name)
+            require(value >= 0, f"`cost.{name}` must be at least 0; got {value:g}")
+        require(self.hotel > 0, "`cost.hotel` must be above 0 W: else time is free, and the slowest way as good")
+        require(len(self.efficiency) > 0, "`cost.efficiency` must be pairs of depth and share; got none")
+        depth, share = zip(*self.efficiency, strict=True)
+        require(bool((np.diff(depth) > 0).all()), f"the depths of `cost.efficiency` must rise; got {list(depth)}")
+        within = min(share) > 0 and max(share) <= 1
+        require(within, f"the shares of `cost.efficiency` must be above 0, at most 1; got {list(share)}")
+
+    def leg(self, time: ArrayLike) -> Array:
+        """As TravelTime says."""
+        return self.hotel * np.asarray(time, np.float64) + self.trim
+
+    def inflection(self, z: ArrayLike) -> Array | None:
+        """As TravelTime says."""
+        depth = np.abs(np.asarray(z, np.float64))
+        known, shares = (np.array(column) for column in zip(*self.efficiency, strict=True))
+        share = np.interp(depth, known, shares)
+        return np.asarray(self.density * GRAVITY * depth * self.volume * 1e-6 / share)
+
+
+Cost = TravelTime | Energy
+PRESETS: dict[str, dict[str, Any]] = {
+    "slocum": {
+        "hotel": 0.5,
+        "trim": 0.0,
+        "volume": 500.0,
+        "efficiency": [[100.0, 0.15], [1000.0, 0.45]],
+        "density": 1025.0,
+        "note": "hotel load of the vehicle alone, 0.5 W, without its sensors; 500 cc from full to empty; pump "
+        "0.1-0.2 at 100 m and 0.4-0.5 at 1000 m from memory; no figure for a change of trim: set yours",
+    },
+}
+
+
+def energy_from_table(table: dict[str, Any]) -> dict[str, Any]:
+    """The keys of an [cost] table of kind "energy", those of its `preset` filled in."""
+    own = dict(table)
+    name = own.pop("preset", None)
+    if name is None:
+        return own
+    known = isinstance(name, str) and name in PRESETS
+    require(known, f"`cost.preset` = {name!r} is not known; choose from: {', '.join(PRESETS)}")
+    return PRESETS[name] | own
