@@ -26,10 +26,11 @@ from .kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
 from .kernels.motion import LANES, X, Y
 from .query import Planner
 from .roadmap import find_edges, node_positions, warm_up
-from .scenario import read_scenario, scenario_from_text, to_toml
+from .scenario import read_scenario, scenario_from_text
 from .settings import require
 from .store import read_roadmap, replacing
 from .threads import in_parallel, threads
+from .toml import to_toml
 
 STEPS, FLIGHTS, AT_ONCE = 60, 16_384, 256
 """RK4 steps of a flight of the raw integrator, flights in batches of LANES, batches a thread takes at once."""

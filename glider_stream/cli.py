@@ -225,6 +225,32 @@ def describe(
 
 
 @cli.command()
+@click.argument("dives", type=FILE)
+@click.option("--preset", default="seaglider", show_default=True, help="The vehicle to begin from, or slocum.")
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    type=key_and_value,
+    metavar="WHAT=COLUMN",
+    help="vertical, horizontal, pitch, glide_angle or buoyancy, where the file calls it otherwise.",
+)
+@click.option("-o", "--output", type=FILE, help="A TOML file for the [glider] section to write.")
+@JSON
+def calibrate(
+    dives: Path, preset: str, columns: tuple[tuple[str, Any], ...], output: Path | None, as_json: bool
+) -> None:
+    """Fit the drag of a vehicle, or its buoyancy, to DIVES: a CSV file of what it flew."""
+    from . import planner
+
+    found = planner.calibrate(dives, output, preset=preset, columns={name: str(own) for name, own in columns})
+    if as_json:
+        _write_json(found.as_dict())
+    else:
+        click.echo(found)
+
+
+@cli.command()
 @click.option("--runs", type=int, help="How often each figure is measured; 5 if not given.")
 @click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
 @click.option("--only", multiple=True, metavar="PART", help="Parts, or problems of the suite; see README.")

@@ -20,7 +20,7 @@ from .query import Planner, check_unchanged
 from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .settings import require
-from .store import check_output, read_roadmap
+from .store import check_output, read_roadmap, replacing
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .bench import Record
+    from .calibrate import Calibration
     from .describe import Description, Place
     from .ocean import Names
     from .suite import Report
@@ -265,6 +266,25 @@ def describe(
     from .describe import describe
 
     return describe(currents, at, names)
+
+
+def calibrate(
+    dives: str | File,
+    output: str | File | None = None,
+    *,
+    preset: str = "seaglider",
+    columns: Mapping[str, str] | None = None,
+) -> "Calibration":
+    """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says."""
+    from .calibrate import calibrate, read_dives
+
+    if output is not None:
+        check_output(output)
+    found = calibrate(read_dives(dives, columns), preset)
+    if output is not None:
+        with replacing(File(output)) as temporary:
+            temporary.write_text(found.table(), encoding="utf-8")
+    return found
 
 
 def bench(

@@ -1,6 +1,5 @@
 """Scenarios: TOML into objects, every key checked; the problem that they make."""
 
-import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -26,6 +25,7 @@ from .roadmap import Problem
 from .sampling import SAMPLERS, Sampler
 from .settings import from_kinds, from_table, require
 from .terrain import TerrainSettings, raster_terrain
+from .toml import to_toml
 
 SECTIONS = (
     "flow",
@@ -303,27 +303,3 @@ def _set(table: dict[str, Any], override: str) -> list[str]:
         require(section, f"`--set` takes section.key=value, and `{key}` is no section; got {override!r}")
     table[keys[-1]] = value
     return keys
-
-
-def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
-    """A nested table as TOML text: values first, then sub-tables, then lists of tables."""
-    lines, below = [], []
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            below.append(f"[{prefix}{key}]\n{to_toml(value, f'{prefix}{key}.')}")
-        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            below.extend(f"[[{prefix}{key}]]\n{to_toml(one, f'{prefix}{key}.')}" for one in value)
-        else:
-            lines.append(f"{key} = {_toml_value(value)}\n")
-    return "".join(lines) + "".join(below)
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, (int, float)):
-        return repr(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml_value(one) for one in value) + "]"
-    # JSON escapes as TOML does, but for one character
-    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -15,9 +15,9 @@ FLOORS = {
     2: "kernels.control",
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine"
-    " errors settings threads hdf5",
+    " errors settings toml threads hdf5",
     4: "cost bins glider flow domain frame ocean terrain brute_force",
-    5: "sampling neighbours edges legs",
+    5: "calibrate sampling neighbours edges legs",
     6: "roadmap path waypoints difference",
     7: "lock store journal query change",
     8: "trade_off slocum seaglider export plot progress describe verify cluster jobs baselines",

@@ -13,7 +13,8 @@ from glider_stream.flow import Uniform, Vortices
 from glider_stream.neighbours import AllNodes, Nearest, Radius
 from glider_stream.roadmap import node_positions
 from glider_stream.sampling import GridSampler, SobolSampler
-from glider_stream.scenario import read_scenario, scenario_from_text, shipped_scenarios, to_toml
+from glider_stream.scenario import read_scenario, scenario_from_text, shipped_scenarios
+from glider_stream.toml import to_toml
 
 OCEAN = (
     SCENARIO.replace(
