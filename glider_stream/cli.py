@@ -113,6 +113,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @click.option(
     "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
 )
+@click.option(
+    "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
+)
+@click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
 @click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
 @JSON
 def query(
@@ -121,6 +125,8 @@ def query(
     goal: Any,
     outputs: tuple[Path, ...],
     most_energy: float | None,
+    thin: float | None,
+    as_card: bool,
     front: bool,
     as_json: bool,
 ) -> None:
@@ -136,8 +142,8 @@ def query(
         corners = planner.trade_off(roadmap, start, goal)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        path = planner.query(roadmap, start, goal, outputs, most_energy)
-        said, found = path, path.found
+        path = planner.query(roadmap, start, goal, outputs, most_energy, thin)
+        said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:
@@ -222,6 +228,23 @@ def describe(
         _write_json(description.as_dict())
     else:
         click.echo(description)
+
+
+@cli.command()
+@ROADMAP
+@click.argument("route", type=FILE)
+@JSON
+def score(roadmap: Path, route: Path, as_json: bool) -> None:
+    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails."""
+    from . import planner
+
+    found = planner.score(roadmap, route)
+    if as_json:
+        _write_json(found.as_dict())
+    else:
+        click.echo(found, err=not found.flyable)
+    if not found.flyable:
+        sys.exit(1)
 
 
 @cli.command()

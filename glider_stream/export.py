@@ -19,6 +19,7 @@ from .seaglider import targets
 from .settings import require
 from .slocum import list_number, mission_files
 from .store import check_output, replacing
+from .windows import windows
 
 Texts = dict[str, str]
 
@@ -152,6 +153,23 @@ def _gpx(path: Path, name: str) -> Texts:
     return _xml(root, name)
 
 
+def _windows(path: Path, name: str) -> Texts:
+    """A polygon for each twelve hours."""
+    features = []
+    for window in windows(path):
+        ring = [(window.west, window.south), (window.east, window.south), (window.east, window.north)]
+        ring += [(window.west, window.north), (window.west, window.south)]
+        properties = {
+            "from": _when(path, window.start) or window.start,
+            "to": _when(path, window.end) or window.end,
+            "depth_min": round(window.shallowest, 2) + 0.0,
+            "depth_max": round(window.deepest, 2),
+        }
+        shape = {"type": "Polygon", "coordinates": [[[round(x, 7), round(y, 7)] for x, y in ring]]}
+        features.append({"type": "Feature", "geometry": shape, "properties": properties})
+    return {name: json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"}
+
+
 EXPORTS: dict[str, Callable[[Path, str], Texts]] = {
     ".json": _json,
     ".geojson": _geojson,
@@ -160,6 +178,7 @@ EXPORTS: dict[str, Callable[[Path, str], Texts]] = {
     ".csv": _csv,
     ".ma": mission_files,
     "targets": targets,
+    ".windows.geojson": _windows,
 }
 """By a file's ending, or its name: what writes it; a form may need more than one file."""
 ANYWHERE = (".json", ".csv")
@@ -168,7 +187,8 @@ ANYWHERE = (".json", ".csv")
 
 def _form(file: str | File) -> str:
     place = File(file)
-    return place.name if place.name in EXPORTS else place.suffix.lower()
+    double = "".join(place.suffixes[-2:]).lower()
+    return next((form for form in (place.name, double) if form in EXPORTS), place.suffix.lower())
 
 
 def check_export(file: str | File) -> None:

@@ -24,7 +24,7 @@ class Leg:
 
     `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
     Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
-    trajectory, and `north` [rad], true north counter-clockwise from the frame's +y.
+    trajectory, and `north` [rad], true north counter-clockwise from the frame's +y. `cost`: its own.
     """
 
     start: Array
@@ -39,6 +39,7 @@ class Leg:
     lonlat: Array | None = None
     track: Array | None = None
     north: float = 0.0
+    cost: float = 0.0
 
     @property
     def compass(self) -> float:

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .card import Card
+from .card import card as card_of
 from .change import untouched
 from .difference import Difference, difference
-from .domain import Array, Point
+from .domain import Array, GeographicDomain, Point
+from .drawn import read_drawn
 from .export import check_export, export_path
 from .jobs import Job, build_file, shard_of
 from .jobs import merge as merge_parts
@@ -19,8 +22,11 @@ from .path import Path, load_path
 from .query import Planner, check_unchanged
 from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
+from .score import Score
+from .score import score as score_of
 from .settings import require
 from .store import check_output, read_roadmap, replacing
+from .thin import thin as thinned
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
 
@@ -131,26 +137,30 @@ def query(
     goal: Point | None = None,
     outputs: Sequence[str | File] = (),
     most_energy: float | None = None,
+    thin: float | None = None,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
     These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
-    for the fastest of the paths of `trade_off` that uses no more.
+    for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
+    near the straight line, where one glide does.
     """
     for output in outputs:
         check_export(output)
+    search, ends = _search(roadmap, start, goal)
     if most_energy is None:
-        search, ends = _search(roadmap, start, goal)
         path = search.query(*ends)
     else:
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
-        front = trade_off(roadmap, start, goal)
+        front = _front(search, ends)
         last = front.paths[-1]
         why = (
             f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}" if last.found else ""
         )
         path = front.within(most_energy) or replace(last, cost=math.inf, legs=(), why=why)
+    if thin is not None:
+        path = thinned(path, thin, search.connect, search.fly)
     for output in outputs:
         export_path(path, output)
     return path
@@ -158,10 +168,31 @@ def query(
 
 def trade_off(roadmap: str | File | Roadmap, start: Point | None = None, goal: Point | None = None) -> TradeOff:
     """The paths of one query that are best for some price of time against energy; points as in `query`."""
-    search, ends = _search(roadmap, start, goal)
+    return _front(*_search(roadmap, start, goal))
+
+
+def _front(search: Planner, ends: tuple[Array | None, Array | None]) -> TradeOff:
     unit = search.problem.evaluator.cost.unit
     require(unit == "J", 'the roadmap\'s cost is time, without energy; build it with [cost] kind = "energy"')
     return find_trade_off(lambda blend: search.query(*ends, blend=blend))
+
+
+def card(roadmap: str | File | Roadmap, path: Path) -> Card:
+    """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
+    road = info(roadmap)
+    return card_of(path, scenario_from_text(road.provenance.scenario).problem())
+
+
+def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
+    """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in a roadmap's water."""
+    drawn = read_drawn(route)
+    search, _ = _search(roadmap, None, None)
+    domain = scenario_from_text(search.roadmap.provenance.scenario).domain
+    ours = File(route).suffix.lower() == ".json" and isinstance(domain, GeographicDomain)
+    points = [np.array(point) if ours else domain.point(point) for point in drawn]
+    for n, point in enumerate(points, 1):
+        search.problem.check_point(point, f"point {n}")
+    return score_of(points, search.connect, search.query)
 
 
 def _search(

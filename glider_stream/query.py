@@ -109,6 +109,14 @@ class Planner:
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
 
+    def connect(self, start: Array, end: Array) -> Edge:
+        """One glide between two points (3,) [m], as the roadmap's method finds it."""
+        return self.problem.evaluator.connect_pair(start, end, self.problem.departure)
+
+    def fly(self, hops: list[tuple[Array, Array, Edge]]) -> Path:
+        """The path of some legs: from, to, edge."""
+        return self._path(hops[0][0], hops[-1][1], hops)
+
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
         """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
         ends = [self._goal(goal) for goal in goals]
@@ -292,8 +300,11 @@ class Planner:
             rows = self.problem.evaluator.trace(source, edge, self.problem.departure)
             rows[:, 0] += clock - self.problem.departure
             control = edge.glide_angle, edge.heading, edge.speed
-            where = self._lonlat(source, target), self._lonlat(*rows[:, 1:]), self._north(source)
-            legs.append(Leg(source, target, *control, clock, edge.time, edge.miss, rows, *where))
+            ends, track = self._lonlat(source, target), self._lonlat(*rows[:, 1:])
+            north = self._north(source)
+            legs.append(
+                Leg(source, target, *control, clock, edge.time, edge.miss, rows, ends, track, north, edge.cost)
+            )
             clock += edge.time
         cost = self._cost(hops)
         return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs, self._unit)

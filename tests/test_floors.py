@@ -18,9 +18,9 @@ FLOORS = {
     " errors settings toml threads hdf5",
     4: "cost bins glider flow domain frame ocean terrain brute_force",
     5: "calibrate sampling neighbours edges legs",
-    6: "roadmap path waypoints difference",
+    6: "roadmap path waypoints windows drawn difference",
     7: "lock store journal query change",
-    8: "trade_off slocum seaglider export plot progress describe verify cluster jobs baselines",
+    8: "trade_off card thin score slocum seaglider export plot progress describe verify cluster jobs baselines",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

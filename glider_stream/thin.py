@@ -1,0 +1,54 @@
+"""Thinning: fewer legs, each flown again before it is believed."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernels.edges import Edge, Status
+from .path import Path
+from .settings import require
+
+Array = NDArray[np.float64]
+Hop = tuple[Array, Array, Edge]
+
+
+def thin(
+    path: Path, tolerance: float, connect: Callable[[Array, Array], Edge], fly: Callable[[list[Hop]], Path]
+) -> Path:
+    """A route whose stops lie within `tolerance` [m] of the old one's (Ramer 1972, Douglas and Peucker 1973).
+
+    A stretch becomes one leg where no stop of it lies further away from the straight line, and where one
+    glide joins its ends: `connect` says so. Else it is cut at its farthest stop. `fly` makes a path of legs.
+    """
+    require(0 <= tolerance < np.inf, f"a route is thinned to 0 m or more; got {tolerance:g}")
+    if len(path.legs) < 2:
+        return path
+    stops = [path.legs[0].start, *(leg.end for leg in path.legs)]
+
+    def hops(first: int, last: int) -> list[Hop]:
+        if last - first == 1:
+            return [(stops[first], stops[last], _edge(path, first))]
+        off = _distances(np.array(stops[first + 1 : last]), stops[first], stops[last])
+        if off.max() <= tolerance:
+            edge = connect(stops[first], stops[last])
+            if edge.status == Status.CONNECTED:
+                return [(stops[first], stops[last], edge)]
+        # where all lie on the line the middle is as good a cut as any, and leaves less to try
+        cut = first + 1 + (int(off.argmax()) if off.max() > 0 else len(off) // 2)
+        return hops(first, cut) + hops(cut, last)
+
+    return fly(hops(0, len(stops) - 1))
+
+
+def _distances(points: Array, start: Array, end: Array) -> Array:
+    """Of points (n, 3) from the line between two others [m]."""
+    way = end - start
+    length = float(way @ way)
+    share = np.clip((points - start) @ way / length, 0, 1)[:, None] if length > 0 else np.zeros((len(points), 1))
+    return np.asarray(np.linalg.norm(points - (start + share * way), axis=1))
+
+
+def _edge(path: Path, n: int) -> Edge:
+    leg = path.legs[n]
+    return Edge(int(Status.CONNECTED), leg.duration, leg.cost, leg.glide_angle, leg.heading, leg.speed, leg.miss)

@@ -1,0 +1,55 @@
+"""Windows: where a vehicle will be in each stretch of time, as vessel traffic services ask."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .frame import wrapped
+from .path import Path
+from .settings import require
+
+HOURS = 12.0
+"""A window, unless said otherwise."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """From `start` to `end` [s since departure]: the box `west`, `south`, `east`, `north`, and depths [m].
+
+    Degrees where the route is geographic, and east is then above west even across the date line; else x, y [m].
+    """
+
+    start: float
+    end: float
+    west: float
+    south: float
+    east: float
+    north: float
+    shallowest: float
+    deepest: float
+
+
+def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
+    """The boxes of a route, one for each stretch of so many hours; the last one ends where the route does."""
+    require(0 < hours < math.inf, f"a window must last more than 0 h; got {hours:g}")
+    rows = path.trajectory
+    if not len(rows):
+        return
+    at = rows[:, 1:3]
+    if path.lonlat is not None:
+        tracks = [leg.track for leg in path.legs if leg.track is not None]
+        require(len(tracks) == len(path.legs), "the route does not know its longitudes; query it again")
+        at = np.concatenate(tracks)
+        at = np.column_stack([wrapped(at[:, 0], float(at[0, 0])), at[:, 1]])
+    count = max(1, math.ceil(rows[-1, 0] / (3600 * hours) - 1e-9))
+    for n in range(count):
+        start, end = 3600 * hours * n, min(3600 * hours * (n + 1), float(rows[-1, 0]))
+        inside = (rows[:, 0] >= start) & (rows[:, 0] <= end)
+        # where the window begins and ends lies between two rows
+        edges = [[np.interp(t, rows[:, 0], column) for column in (*at.T, rows[:, 3])] for t in (start, end)]
+        places = np.vstack([np.column_stack([at, rows[:, 3]])[inside], edges])
+        low, high = places.min(axis=0), places.max(axis=0)
+        (west, south, bottom), (east, north, top) = low.tolist(), high.tolist()
+        yield Window(start, end, west, south, east, north, -top, -bottom)
