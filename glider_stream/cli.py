@@ -189,13 +189,14 @@ def verify(roadmap: Path, sample: int, as_json: bool) -> None:
 @cli.command()
 @ROADMAP
 @click.argument("path", required=False, type=FILE)
-@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF.")
+@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG, PDF, or HTML for a page.")
 @click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
-def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...]) -> None:
+@click.option("--fronts", type=float, metavar="HOURS", help="The chart with what is reached every so many hours.")
+def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], fronts: float | None) -> None:
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None)
+    planner.plot(roadmap, path, output, depths or None, fronts)
     click.echo(output)
 
 

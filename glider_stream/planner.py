@@ -20,7 +20,7 @@ from .jobs import Job, build_file, shard_of
 from .jobs import merge as merge_parts
 from .path import Path, load_path
 from .query import Planner, check_unchanged
-from .roadmap import Progress, Roadmap, build_roadmap, node_positions
+from .roadmap import Problem, Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .score import Score
 from .score import score as score_of
@@ -227,15 +227,19 @@ def plot(
     path: str | File | Path | None = None,
     output: str | File | None = None,
     depths: Sequence[float] | None = None,
-) -> "Figure":
+    fronts: float | None = None,
+) -> "Figure | None":
     """Draw a path over its roadmap and the current at some `depths` [m], or the roadmap where there is none.
 
-    A path file or object; up to four depths for a path, one for a roadmap. Written where `output` says.
+    A path file or object; up to four depths for a path, one for a roadmap. `fronts` [h] draws the pilot's
+    chart instead: what can be reached every so many hours, headings, speeds. Written where `output` says; an
+    .html is a page with the route on a map and a profile, and no figure.
     """
-    from .plot import check_figure, plot_roadmap, plot_route, save_figure
+    from .plot import check_figure, check_page, plot_chart, plot_roadmap, plot_route, save_figure
 
+    as_page = output is not None and File(output).suffix.lower() == ".html"
     if output is not None:
-        check_figure(output)
+        (check_page if as_page else check_figure)(output)
     road = info(roadmap)
     title = "" if isinstance(roadmap, Roadmap) else File(roadmap).stem
     route = path if path is None or isinstance(path, Path) else load_path(path)
@@ -245,15 +249,42 @@ def plot(
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     if route is None:
         require(depths is None or len(depths) == 1, f"a roadmap is drawn at one depth; got {depths}")
+        require(fronts is None and not as_page, "fronts, and pages, are of a route; give its path file")
         figure = plot_roadmap(flow, terrain, problem, road, None if depths is None else depths[0], title)
     else:
         stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
         here = bool(problem.evaluator.allowed(stops, problem.departure).all())
         require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
-        figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+        if as_page:
+            assert output is not None
+            _write_page(flow, terrain, problem, road, route, depths, title, output)
+            return None
+        if fronts is None:
+            figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+        else:
+            require(depths is None, f"the chart with fronts is drawn at the surface; got depths {depths}")
+            arrival = Planner(road, problem).arrivals(route.start)
+            figure = plot_chart(flow, terrain, problem, road.position, arrival, route, fronts, title)
     if output is not None:
         save_figure(figure, output)
     return figure
+
+
+def _write_page(
+    flow: Any,
+    terrain: Any,
+    problem: Problem,
+    road: Roadmap,
+    route: Path,
+    depths: Sequence[float] | None,
+    title: str,
+    output: str | File,
+) -> None:
+    from .plot import page_depths, route_page, save_page
+
+    save_page(
+        route_page(flow, terrain, problem, route, page_depths(problem, road.position, depths), title), output
+    )
 
 
 def plot_steering(

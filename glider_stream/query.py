@@ -109,6 +109,12 @@ class Planner:
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
 
+    def arrivals(self, start: ArrayLike | None = None) -> Array:
+        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        search = self._search(self._start(start), Blend(0.0, 1.0))
+        nodes = len(self.roadmap.position)
+        return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
+
     def connect(self, start: Array, end: Array) -> Edge:
         """One glide between two points (3,) [m], as the roadmap's method finds it."""
         return self.problem.evaluator.connect_pair(start, end, self.problem.departure)
