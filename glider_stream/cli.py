@@ -113,6 +113,8 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @click.option(
     "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
 )
+@click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
+@click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
 @click.option(
     "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
 )
@@ -125,6 +127,8 @@ def query(
     goal: Any,
     outputs: tuple[Path, ...],
     most_energy: float | None,
+    most_yos: int | None,
+    most_hours: float | None,
     thin: float | None,
     as_card: bool,
     front: bool,
@@ -133,6 +137,7 @@ def query(
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
     from . import planner
 
+    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
     if front:
         if outputs or most_energy is not None:
             raise click.UsageError(
@@ -142,7 +147,7 @@ def query(
         corners = planner.trade_off(roadmap, start, goal)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin)
+        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None)
         said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())

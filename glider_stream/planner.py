@@ -26,6 +26,7 @@ from .score import Score
 from .score import score as score_of
 from .settings import require
 from .store import check_output, read_roadmap, replacing
+from .surfacing import Surfacing, SurfacingPlanner
 from .thin import thin as thinned
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
@@ -138,17 +139,20 @@ def query(
     outputs: Sequence[str | File] = (),
     most_energy: float | None = None,
     thin: float | None = None,
+    surfacing: Mapping[str, Any] | None = None,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
     These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
     for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
-    near the straight line, where one glide does.
+    near the straight line, where one glide does. `surfacing` is a rule for how often to come up, as
+    `surfacing.Surfacing` has it; the scenario's own if None.
     """
     for output in outputs:
         check_export(output)
-    search, ends = _search(roadmap, start, goal)
+    rule = None if surfacing is None else Surfacing(**surfacing)
+    search, ends = _search(roadmap, start, goal, rule)
     if most_energy is None:
         path = search.query(*ends)
     else:
@@ -196,12 +200,17 @@ def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
 
 
 def _search(
-    roadmap: str | File | Roadmap, start: Point | None, goal: Point | None
+    roadmap: str | File | Roadmap, start: Point | None, goal: Point | None, rule: Surfacing | None = None
 ) -> tuple[Planner, tuple[Array | None, Array | None]]:
     road = info(roadmap)
     scenario = scenario_from_text(road.provenance.scenario)
     ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
-    return Planner(road, scenario.problem()), (ends[0], ends[1])
+    if rule is None and scenario.query is not None:
+        rule = Surfacing(scenario.query.most_yos, scenario.query.most_hours)
+    problem = scenario.problem()
+    free = rule is None or rule == Surfacing()
+    search = Planner(road, problem) if free or rule is None else SurfacingPlanner(road, problem, rule)
+    return search, (ends[0], ends[1])
 
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":
