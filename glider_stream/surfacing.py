@@ -43,7 +43,7 @@ class Surfacing:
         yos = (glide_angle > 0).astype(np.int64) if self.most_yos is not None else np.zeros(len(time), np.int64)
         if self.most_hours is None:
             return yos, np.zeros(len(time), np.int64)
-        return yos, np.ceil(time / (3600 * self.most_hours / BINS) - 1e-9).astype(np.int64)
+        return yos, np.ceil(np.nan_to_num(time) / (3600 * self.most_hours / BINS) - 1e-9).astype(np.int64)
 
 
 class SurfacingPlanner(Planner):
