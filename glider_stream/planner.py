@@ -29,6 +29,7 @@ from .store import check_output, read_roadmap, replacing
 from .thin import thin as thinned
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
+from .windows import HOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -138,13 +139,15 @@ def query(
     outputs: Sequence[str | File] = (),
     most_energy: float | None = None,
     thin: float | None = None,
+    window_hours: float = HOURS,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
     These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
     for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
-    near the straight line, where one glide does.
+    near the straight line, where one glide does; not where that takes more than `most_energy`.
+    Exported windows last `window_hours`.
     """
     for output in outputs:
         check_export(output)
@@ -160,9 +163,10 @@ def query(
         )
         path = front.within(most_energy) or replace(last, cost=math.inf, legs=(), why=why)
     if thin is not None:
-        path = thinned(path, thin, search.connect, search.fly)
+        fewer = thinned(path, thin, search.connect, search.fly)
+        path = path if most_energy is not None and fewer.cost > most_energy else fewer
     for output in outputs:
-        export_path(path, output)
+        export_path(path, output, window_hours)
     return path
 
 
@@ -188,11 +192,13 @@ def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
     drawn = read_drawn(route)
     search, _ = _search(roadmap, None, None)
     domain = scenario_from_text(search.roadmap.provenance.scenario).domain
-    ours = File(route).suffix.lower() == ".json" and isinstance(domain, GeographicDomain)
-    points = [np.array(point) if ours else domain.point(point) for point in drawn]
+    on_globe = isinstance(domain, GeographicDomain)
+    cure = "and the roadmap is in metres; give x, y, z in a CSV file"
+    require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
+    points = [domain.point(place) if drawn.geographic else np.array(place) for place in drawn.places]
     for n, point in enumerate(points, 1):
         search.problem.check_point(point, f"point {n}")
-    return score_of(points, search.connect, search.query)
+    return score_of(points, search.connect, search.query, search.fly)
 
 
 def _search(
