@@ -43,7 +43,7 @@ def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
 
 
 @dataclass(frozen=True)
-class _End:
+class End:
     """An end of a query: its `point` (3,) [m], the nodes that lie there, often none, else its legs."""
 
     point: Array
@@ -70,7 +70,7 @@ class _Search:
     A state is a node, where turns are free; else a node and how it was come to, by a dive or by a climb.
     """
 
-    start: _End
+    start: End
     blend: Blend
     origin: int
     cost: Array
@@ -111,6 +111,12 @@ class Planner:
         ends = [self._goal(goal) for goal in goals]
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
+
+    def arrivals(self, start: ArrayLike | None = None) -> Array:
+        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        search = self._search(self._start(start), Blend(0.0, 1.0))
+        nodes = len(self.roadmap.position)
+        return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
 
     def connect(self, start: Array, end: Array) -> Edge:
         """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.
@@ -169,13 +175,13 @@ class Planner:
     def _legs(self) -> Legs:
         return self.problem.legs(self.roadmap.position)
 
-    def _start(self, point: ArrayLike | None) -> _End:
+    def _start(self, point: ArrayLike | None) -> End:
         nodes, place = self._place(point, self.problem.start, "start")
-        return _End(place, nodes, None if nodes.size else _connected(self._legs.away(place)))
+        return End(place, nodes, None if nodes.size else _connected(self._legs.away(place)))
 
-    def _goal(self, point: ArrayLike | None) -> _End:
+    def _goal(self, point: ArrayLike | None) -> End:
         nodes, place = self._place(point, self.problem.goal, "goal")
-        return _End(place, nodes, None if nodes.size else _connected(self._legs.towards(place)))
+        return End(place, nodes, None if nodes.size else _connected(self._legs.towards(place)))
 
     def _place(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
         """The nodes that lie at an end of the query, often none, and where it is."""
@@ -222,7 +228,7 @@ class Planner:
         """How many states a node has."""
         return 1 if self._graph[3] is None else 2
 
-    def _search(self, start: _End, blend: Blend) -> _Search:
+    def _search(self, start: End, blend: Blend) -> _Search:
         """Dijkstra's algorithm from a start."""
         (ways, target, indptr, turn), cost = self._graph, self._costs(blend)
         states, first, last = len(indptr) - 2, len(ways), len(ways)
@@ -239,7 +245,7 @@ class Planner:
         distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
         return _Search(start, blend, origin, distance[0], before[0])
 
-    def _direct(self, start: _End, goals: Sequence[_End]) -> list[Edge]:
+    def _direct(self, start: End, goals: Sequence[End]) -> list[Edge]:
         """The legs from end to end; between nodes the roadmap has said what there is."""
         asked = [n for n, end in enumerate(goals) if start.legs is not None or end.legs is not None]
         points = np.array([start.point, *(goals[n].point for n in asked)])
@@ -250,7 +256,7 @@ class Planner:
             legs[n] = _edge(row)
         return legs
 
-    def _way(self, search: _Search, goal: _End, direct: Edge) -> Path:
+    def _way(self, search: _Search, goal: End, direct: Edge) -> Path:
         """The path to a goal, by nodes or directly."""
         start_at, goal_at = search.start.point, goal.point
         if np.array_equal(start_at, goal_at):
@@ -271,7 +277,7 @@ class Planner:
             state = earlier
         return self._path(start_at, goal_at, hops[::-1])
 
-    def _through(self, search: _Search, goal: _End) -> tuple[float, int, Edge | None]:
+    def _through(self, search: _Search, goal: End) -> tuple[float, int, Edge | None]:
         """The least cost of a way to a goal by nodes, inf where there is none; its last state, and a last leg."""
         phases = self._phases
         nodes = goal.nodes if goal.legs is None else goal.legs.nodes

@@ -57,11 +57,16 @@ KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
 
 @dataclass(frozen=True)
 class QueryPoints:
-    """`start` and `goal` in the domain's coordinates; gliders leave every node at `departure` [s]."""
+    """`start` and `goal` in the domain's coordinates; gliders leave every node at `departure` [s].
+
+    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule.
+    """
 
     start: Point
     goal: Point
     departure: float = 0.0
+    most_yos: int | None = None
+    most_hours: float | None = None
 
     def __post_init__(self) -> None:
         fits = abs(self.departure) <= LONGEST

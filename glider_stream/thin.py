@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,17 @@ Hop = tuple[Array, Array, Edge]
 
 
 def thin(
-    path: Path, tolerance: float, connect: Callable[[Array, Array], Edge], fly: Callable[[list[Hop]], Path]
+    path: Path,
+    tolerance: float,
+    connect: Callable[[Array, Array], Edge],
+    fly: Callable[[list[Hop]], Path],
+    stays: Callable[[Array], bool] = lambda stop: False,
 ) -> Path:
     """A route whose stops lie within `tolerance` [m] of the old one's (Ramer 1972, Douglas and Peucker 1973).
 
     A stretch becomes one leg where no stop of it lies further away from the straight line, and where one
     glide joins its ends: `connect` says so. Else it is cut at its farthest stop. `fly` makes a path of legs,
-    those that stay flown again, too.
+    those that stay flown again, too. A stop that `stays` is never left out.
     """
     require(0 <= tolerance < np.inf, f"a route is thinned to 0 m or more; got {tolerance:g}")
     if len(path.legs) < 2:
@@ -30,7 +35,8 @@ def thin(
     stops = [old[0][0], *(end for _, end, _ in old)]
     hops: list[Hop] = []
     # stretches that wait, the next one last: a route may be longer than Python's stack is deep
-    waiting = [(0, len(old))]
+    fixed = [0, *(n for n in range(1, len(old)) if stays(stops[n])), len(old)]
+    waiting = list(pairwise(fixed))[::-1]
     while waiting:
         first, last = waiting.pop()
         if last - first == 1:

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from ..kernels.cache import entry_point
 from ..kernels.flow import Flow, contains, velocity
-from ..kernels.terrain import Terrain, allowed
+from ..kernels.terrain import OpenWater, Terrain, allowed
 from ..settings import require
 from .canvas import GREY, INK, Array, Side, colours, length_unit, thinned
 
@@ -50,6 +51,19 @@ def sample_water(terrain: Terrain, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> 
     wet = np.zeros(points[0].size, np.bool_)
     _sample_water(terrain, *(p.flatten() for p in points), wet)
     return wet.reshape(points[0].shape)
+
+
+def sample_bottom(terrain: Terrain, x: Array, y: Array) -> Array:
+    """How deep a glider may go at places [m]: the height below which the terrain closes the water, upward."""
+    if isinstance(terrain, OpenWater):
+        return np.full(np.shape(x), terrain.floor)
+    at = np.stack(
+        [(np.asarray(x) - terrain.x_lo) * terrain.per_x, (np.asarray(y) - terrain.y_lo) * terrain.per_y]
+    )
+    i, j = (map_coordinates(terrain.index_map[..., n], at, order=1, mode="nearest") for n in range(2))
+    count = terrain.bottom.shape
+    rows, columns = (np.clip(np.rint(k), 0, n - 1).astype(np.intp) for k, n in zip((i, j), count, strict=True))
+    return np.asarray(np.minimum(terrain.bottom[rows, columns] + terrain.clearance, 0.0))
 
 
 class Frame(NamedTuple):
