@@ -119,6 +119,7 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
+@click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
 @click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
 @JSON
 def query(
@@ -131,6 +132,7 @@ def query(
     most_hours: float | None,
     thin: float | None,
     as_card: bool,
+    window_hours: float | None,
     front: bool,
     as_json: bool,
 ) -> None:
@@ -139,15 +141,18 @@ def query(
 
     rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
     if front:
-        if outputs or most_energy is not None:
+        alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+        if not alone:
             raise click.UsageError(
-                "--trade-off goes with neither --output nor --most-energy; leave one of them out"
+                "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
+                "leave one of them out"
             )
         said: Any
         corners = planner.trade_off(roadmap, start, goal)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None)
+        hours = {} if window_hours is None else {"window_hours": window_hours}
+        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None, **hours)
         said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())

@@ -30,6 +30,8 @@ from .surfacing import Surfacing, SurfacingPlanner
 from .thin import thin as thinned
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
+from .waypoints import SURFACE
+from .windows import HOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,14 +142,16 @@ def query(
     most_energy: float | None = None,
     thin: float | None = None,
     surfacing: Mapping[str, Any] | None = None,
+    window_hours: float = HOURS,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
     These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
     for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
-    near the straight line, where one glide does. `surfacing` is a rule for how often to come up, as
-    `surfacing.Surfacing` has it; the scenario's own if None.
+    near the straight line, where one glide does, and none where that breaks another rule. `surfacing`
+    is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. Exported
+    windows last `window_hours`.
     """
     for output in outputs:
         check_export(output)
@@ -164,10 +168,20 @@ def query(
         )
         path = front.within(most_energy) or replace(last, cost=math.inf, legs=(), why=why)
     if thin is not None:
-        path = thinned(path, thin, search.connect, search.fly)
+        path = _with_fewer_legs(path, thin, search, most_energy)
     for output in outputs:
-        export_path(path, output)
+        export_path(path, output, window_hours)
     return path
+
+
+def _with_fewer_legs(path: Path, tolerance: float, search: Planner, most_energy: float | None) -> Path:
+    """A path thinned, or as it is where fewer legs would break what else was asked for."""
+    rule = search.rule if isinstance(search, SurfacingPlanner) else Surfacing()
+    bound = rule != Surfacing()
+    stays = (lambda stop: bool(stop[2] >= -SURFACE)) if bound else (lambda stop: False)
+    fewer = thinned(path, tolerance, search.connect, search.fly, stays)
+    keeps = rule.holds(fewer) and (most_energy is None or fewer.cost <= most_energy)
+    return fewer if keeps else replace(path, unthinned=fewer.unthinned)
 
 
 def trade_off(roadmap: str | File | Roadmap, start: Point | None = None, goal: Point | None = None) -> TradeOff:
@@ -190,13 +204,16 @@ def card(roadmap: str | File | Roadmap, path: Path) -> Card:
 def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
     """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in a roadmap's water."""
     drawn = read_drawn(route)
-    search, _ = _search(roadmap, None, None)
+    # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
+    search, _ = _search(roadmap, None, None, Surfacing())
     domain = scenario_from_text(search.roadmap.provenance.scenario).domain
-    ours = File(route).suffix.lower() == ".json" and isinstance(domain, GeographicDomain)
-    points = [np.array(point) if ours else domain.point(point) for point in drawn]
+    on_globe = isinstance(domain, GeographicDomain)
+    cure = "and the roadmap is in metres; give x, y, z in a CSV file"
+    require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
+    points = [domain.point(place) if drawn.geographic else np.array(place) for place in drawn.places]
     for n, point in enumerate(points, 1):
         search.problem.check_point(point, f"point {n}")
-    return score_of(points, search.connect, search.query)
+    return score_of(points, search.connect, search.query, search.fly)
 
 
 def _search(

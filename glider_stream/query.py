@@ -21,6 +21,9 @@ from .settings import require
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
+FLOWN_AGAIN = 0.1
+"""By how much a leg that is flown again may miss by more than the tolerance, in tolerances: as in verify."""
 NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 
 
@@ -116,12 +119,26 @@ class Planner:
         return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
 
     def connect(self, start: Array, end: Array) -> Edge:
-        """One glide between two points (3,) [m], as the roadmap's method finds it."""
-        return self.problem.evaluator.connect_pair(start, end, self.problem.departure)
+        """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.
+
+        A line or a surface of controls finds few of the glides that there are; what it says of a pair that
+        the flow map does not join either stays.
+        """
+        evaluator, departure = self.problem.evaluator, self.problem.departure
+        edge = evaluator.connect_pair(start, end, departure)
+        if edge.status in EXACT_MAY_FIND and evaluator.by_fan() is not evaluator:
+            exact = evaluator.by_fan().connect_pair(start, end, departure)
+            return exact if exact.status == Status.CONNECTED else edge
+        return edge
 
     def fly(self, hops: list[tuple[Array, Array, Edge]]) -> Path:
-        """The path of some legs: from, to, edge."""
-        return self._path(hops[0][0], hops[-1][1], hops)
+        """The path of some legs, from, to, edge, flown again; InputError where one does not end where it says."""
+        path = self._path(hops[0][0], hops[-1][1], hops)
+        most = (1 + FLOWN_AGAIN) * self.problem.evaluator.integration.tolerance
+        for n, leg in enumerate(path.legs, 1):
+            off = math.dist(leg.trajectory[-1, 1:], leg.end)
+            require(off <= most, f"leg {n} ends {off:.1f} m from where it should; `verify` the roadmap")
+        return path
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
         """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""

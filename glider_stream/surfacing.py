@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .kernels.edges import Status
 from .legs import Attached, Legs
+from .path import Path
 from .query import End, Planner
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
 from .settings import require
@@ -37,6 +38,17 @@ class Surfacing:
     def counts(self) -> tuple[int, int]:
         """How many states of either measure there are."""
         return 1 if self.most_yos is None else self.most_yos + 1, 1 if self.most_hours is None else BINS + 1
+
+    def holds(self, path: Path) -> bool:
+        """Whether a path keeps the rule, each leg's time as it is."""
+        yos, hours = 0, 0.0
+        for leg in path.legs:
+            yos, hours = yos + (leg.glide_angle > 0), hours + leg.duration / 3600
+            if yos > (self.most_yos or math.inf) or hours > (self.most_hours or math.inf):
+                return False
+            if leg.end[2] >= -SURFACE:
+                yos, hours = 0, 0.0
+        return True
 
     def steps(self, glide_angle: Array, time: Array) -> tuple[Index, Index]:
         """By how much legs (n,) use up either measure: a climb ends a yo; time in parts of the most."""
