@@ -281,7 +281,7 @@ class Catalogue:
             elsewhere = [name for name in hits if said != name and name not in own and OTHERS.match(name)]
             require(
                 not elsewhere,
-                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, the places of cells' "
+                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, places of cells' "
                 "centres or corners: add the file that holds its own, or name `lon` and `lat` in `names`",
             )
             require(
