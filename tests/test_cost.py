@@ -60,7 +60,7 @@ def random_roadmap(seed, nodes=7):
     climbs = position[target, 2] > position[source, 2]
     base = roadmap()
     return replace(
-        base, position=position, target=target.astype(np.int32), time=time, cost=edge_cost(COST.kernel(), time),
+        base, position=position, target=target.astype(np.int32), time=time, cost=COST.hotel * time + COST.trim,
         indptr=np.concatenate([[0], np.cumsum(np.bincount(source, minlength=nodes))]),
         glide_angle=np.where(climbs, 0.5, -0.5), heading=0 * time, speed=0 * time + 0.5, miss=0 * time,
     )  # fmt: skip
