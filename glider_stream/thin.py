@@ -29,7 +29,7 @@ def thin(
     those that stay flown again, too. A stop that `stays` is never left out.
     """
     require(0 <= tolerance < np.inf, f"a route is thinned to 0 m or more; got {tolerance:g}")
-    if len(path.legs) < 2:
+    if not path.legs:
         return path
     old = hops_of(path)
     stops = [old[0][0], *(end for _, end, _ in old)]
