@@ -100,15 +100,34 @@ def plot(
     path: str | File | Path | None = None,
     output: str | File | None = None,
     depths: Sequence[float] | None = None,
-) -> "Figure":
+    *,
+    chart: bool = False,
+    fronts: float | None = None,
+) -> "Figure | None":
     """Draw a path over its roadmap and the current at some `depths` [m], or the roadmap where there is none.
 
-    A path file or object; up to four depths for a path, one for a roadmap. Written where `output` says.
+    A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path by
+    time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written where
+    `output` says; one that ends in .html is a page to look around in, and no figure is returned.
     """
-    from .plot import check_figure, plot_roadmap, plot_route, save_figure
+    from .plot import (
+        PAGE,
+        check_figure,
+        fronts_of,
+        placed,
+        plot_chart,
+        plot_roadmap,
+        plot_route,
+        save_figure,
+        save_page,
+    )  # fmt: skip
 
+    as_page = output is not None and File(output).suffix.lower() == PAGE
     if output is not None:
-        check_figure(output)
+        check_output(output) if as_page else check_figure(output)
+    needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
+    chart = chart or as_page or fronts is not None
+    require(path is not None or not chart, f"{needs} needs a path, got none; give the file that `query -o` wrote")
     road = info(roadmap)
     title = "" if isinstance(roadmap, Roadmap) else File(roadmap).stem
     route = path if path is None or isinstance(path, Path) else load_path(path)
@@ -123,7 +142,18 @@ def plot(
         stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
         here = bool(problem.evaluator.allowed(stops, problem.departure).all())
         require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
-        figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+        if chart:
+            route, every = placed(route, problem), None
+            if fronts is not None:
+                arrival = Planner(road, problem).arrivals(route.start)
+                every = (fronts_of(road.position, arrival, terrain), fronts)
+            if as_page:
+                assert output is not None
+                save_page(output, flow, terrain, problem, road.position, route, depths, every, title)
+                return None
+            figure = plot_chart(flow, terrain, problem, route, depths, every, title)
+        else:
+            figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
     if output is not None:
         save_figure(figure, output)
     return figure

@@ -1,7 +1,7 @@
 """Queries: Dijkstra over a roadmap, a start and a goal attached to it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -90,6 +90,18 @@ class Planner:
                 row[m] = 0.0 if np.array_equal(search.start.point, end.point) else _through(search, end)[0]
                 row[m] = min(row[m], leg.cost if leg.status == Status.CONNECTED else math.inf)
         return costs
+
+    def arrivals(self, start: ArrayLike | None = None) -> Array:
+        """The least times [s] from a point (3,) [m] to every node: (n,), inf where there is no way."""
+        begin, road = self._start(start), self.roadmap
+        time, target, nodes = road.time, road.target, len(road.position)
+        if begin.legs is not None:
+            time = np.concatenate([time, begin.legs.outcomes[:, 1]])
+            target = np.concatenate([target, begin.legs.nodes.astype(np.int32)])
+        indptr = np.append(road.indptr, target.size).astype(np.int32)
+        origin = int(begin.nodes[0]) if begin.nodes.size else nodes
+        graph = csr_array((time, target, indptr), shape=(nodes + 1, nodes + 1))
+        return np.asarray(dijkstra(graph, directed=True, indices=[origin])[0, :nodes])
 
     @cached_property
     def _legs(self) -> Legs:
@@ -189,17 +201,20 @@ class Planner:
             clock += edge.time
         return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs)
 
+    def _north(self, point: Array) -> float:
+        to_lonlat = self.problem.to_lonlat
+        return 0.0 if to_lonlat is None else true_north(to_lonlat, point)
+
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
 
-    def _north(self, point: Array) -> float:
-        """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
-        ends = self._lonlat(point, point + np.array([0.0, 1.0, 0.0]))
-        if ends is None:
-            return 0.0
-        east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
-        return math.atan2(east, north)
+
+def true_north(to_lonlat: Callable[[Array], Array], point: Array) -> float:
+    """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
+    ends = to_lonlat(np.stack([point, point + np.array([0.0, 1.0, 0.0])]))
+    east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
+    return math.atan2(east, north)
 
 
 def _through(search: _Search, goal: _End) -> tuple[float, int]:

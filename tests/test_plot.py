@@ -199,8 +199,8 @@ def test_panels_and_their_units_fit_the_scale(figures):
     assert "(b) Current at 0 m, t = 6 h" in titles(ocean)
     labels = [text for text, _ in written(ocean)]
     assert {
-        "East of 18.5000° W (km)",
-        "North of 38.0000° N (km)",
+        "Longitude (°)",
+        "Latitude (°)",
         "Depth (m)",
         "Time since departure (h)",
     } <= set(labels)
