@@ -174,10 +174,6 @@ def _draw_speeds(ax: "Axes", steps: Along, clock: _Clock) -> None:
 
 def _legend(ax: "Axes", lines: list[Any]) -> None:
     """Above the panel, at its right: within, it would hide what it names."""
-    look: dict[str, Any] = {
-        "loc": "lower right",
-        "bbox_to_anchor": (1.0, 0.985),
-        "ncols": len(lines),
-        "frameon": False,
-    }
-    ax.legend(handles=lines, fontsize=8, borderaxespad=0.1, handlelength=1.6, columnspacing=1.2, **look)
+    look: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.985), "frameon": False}
+    look |= {"fontsize": 8, "borderaxespad": 0.1, "handlelength": 1.6, "columnspacing": 1.2}
+    ax.legend(handles=lines, ncols=len(lines), **look)

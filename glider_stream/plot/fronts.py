@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 MOST = 100
 """More lines than this are a grey area."""
-STRETCHED = 4.0
-"""A triangle whose side is so many times the usual distance of nodes spans water that nobody asked about."""
+STRETCHED = 3.0
+"""A triangle with a side so many times the median one spans water that nobody asked about."""
 HOUR = 3600.0
 FRONT = "#7a1f6b"
 
@@ -34,7 +34,7 @@ class Fronts(NamedTuple):
 
 def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
     """The places of nodes (n, 3) [m] that are reached, `arrival` (n,) [s], inf where one is not."""
-    from scipy.spatial import Delaunay, QhullError, cKDTree
+    from scipy.spatial import Delaunay, QhullError
 
     known = np.isfinite(arrival)
     places, which = np.unique(np.round(position[known, :2], 3), axis=0, return_inverse=True)
@@ -47,12 +47,11 @@ def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
             triangles = Delaunay(places).simplices.astype(np.intp)
         except QhullError:  # all on one line
             return Fronts(x, y, time, triangles)
-        usual = float(np.median(np.asarray(cKDTree(places).query(places, k=2)[0])[:, 1]))
         corners = places[triangles]
-        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         middle = corners.mean(axis=1)
         wet = sample_water(without_clearance(terrain), middle[:, 0], middle[:, 1], 0.0)
-        triangles = triangles[wet & (sides <= STRETCHED * usual)]
+        triangles = triangles[wet & (sides.max(axis=1) <= STRETCHED * np.median(sides))]
     return Fronts(x, y, time, triangles)
 
 
@@ -63,8 +62,7 @@ def front_times(fronts: Fronts, hours: float) -> Array:
     count = math.floor(last / hours)
     least = f"give {last / MOST:.2g} hours or more"
     require(count <= MOST, f"`fronts` every {hours:g} hours are {count} lines until {last:.3g} hours; {least}")
-    times: Array = np.arange(1, count + 1) * (hours * HOUR)
-    return times
+    return np.asarray(np.arange(1, count + 1) * (hours * HOUR), np.float64)
 
 
 def draw_fronts(ax: "Axes", frame: Frame, fronts: Fronts, hours: float) -> None:

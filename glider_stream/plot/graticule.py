@@ -15,7 +15,7 @@ STEPS = (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005
 FINE = 120  # cells along the longer side
 
 
-def round_degrees(low: float, high: float, most: int = 5) -> Array:
+def round_degrees(low: float, high: float, most: int) -> Array:
     """Round angles [degrees] from low to high, at most some: the finest step that gives no more."""
     fits = [step for step in STEPS if np.floor(high / step) - np.ceil(low / step) + 1 <= most]
     step = min(fits, default=STEPS[0])
@@ -30,7 +30,7 @@ def named(angle: float, letters: str) -> str:
     return text if abs(angle) < 1e-9 or abs(angle) == 180.0 else text + letters[int(angle < 0)]
 
 
-def draw_graticule(ax: "Axes", frame: Frame, lines: bool = True) -> None:
+def draw_graticule(ax: "Axes", frame: Frame) -> None:
     """Ticks at round longitudes and latitudes, where they meet the map's lower and left side; fine lines."""
     if frame.to_lonlat is None:
         return
@@ -40,7 +40,7 @@ def draw_graticule(ax: "Axes", frame: Frame, lines: bool = True) -> None:
     below, beside = (np.linspace(*side, 2 * FINE) for side in (frame.x, frame.y))
     south = frame.to_lonlat(np.column_stack([below, np.full_like(below, frame.y[0]), np.zeros_like(below)]))
     west = frame.to_lonlat(np.column_stack([np.full_like(beside, frame.x[0]), beside, np.zeros_like(beside)]))
-    meridians, parallels = round_degrees(lon.min(), lon.max()), round_degrees(lat.min(), lat.max())
+    meridians, parallels = round_degrees(lon.min(), lon.max(), 4), round_degrees(lat.min(), lat.max(), 5)
     for angles, edge, along, axis, letters in (
         (meridians, south[:, 0], below, ax.xaxis, "EW"),
         (parallels, west[:, 1], beside, ax.yaxis, "NS"),
@@ -48,15 +48,8 @@ def draw_graticule(ax: "Axes", frame: Frame, lines: bool = True) -> None:
         there = angles[(angles >= edge[0]) & (angles <= edge[-1])]
         ticks = np.interp(there, edge, along) / frame.unit
         axis.set_ticks(ticks, [named(angle, letters) for angle in there])
-    if lines:
-        look: dict[str, Any] = {
-            "colors": INK,
-            "linewidths": 0.4,
-            "alpha": 0.25,
-            "linestyles": "solid",
-            "zorder": 3,
-        }
-        for field, angles in ((lon, meridians), (lat, parallels)):
-            within = angles[(angles > field.min()) & (angles < field.max())]
-            if within.size:
-                ax.contour(x / frame.unit, y / frame.unit, field, levels=within, **look)
+    look: dict[str, Any] = {"colors": INK, "linewidths": 0.4, "alpha": 0.25, "linestyles": "solid", "zorder": 3}
+    for field, angles in ((lon, meridians), (lat, parallels)):
+        within = angles[(angles > field.min()) & (angles < field.max())]
+        if within.size:
+            ax.contour(x / frame.unit, y / frame.unit, field, levels=within, **look)

@@ -88,7 +88,7 @@ const drawRules = () => {
   const [y0, y1] = [Math.max(shown[2], south), Math.min(shown[3], north)];
   if (x0 >= x1 || y0 >= y1) return;
   const corners = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].map(([x, y]) => rulesAt(x, y));
-  const most = [clamp(view.width / 110, 2, 8), clamp(view.height / 80, 2, 8)];
+  const most = [clamp(((x1 - x0) * view.scale) / 90, 1, 8), clamp(((y1 - y0) * view.scale) / 70, 1, 8)];
   pen.font = "11.5px system-ui, 'Liberation Sans', sans-serif";
   rules.forEach((mesh, axis) => {
     const values = corners.map((corner) => corner[axis]), low = Math.min(...values), high = Math.max(...values);
@@ -105,7 +105,7 @@ const drawRules = () => {
       const first = seen.reduce((a, b) => (axis ? (b[0] < a[0] ? b : a) : b[1] < a[1] ? b : a));
       const number = data.lonlat ? angle(n * step, axis ? "NS" : "EW", digits) : `${+(n * step).toFixed(digits)} ${data.unit.name}`;
       pen.textAlign = axis ? "left" : "center";
-      const x = axis ? Math.max(screenX(x0), 0) + 5 : clamp(screenX(first[0]), 26, view.width - 26);
+      const x = axis ? Math.max(screenX(x0), 0) + 5 : clamp(screenX(first[0]), Math.max(screenX(x0), 0) + 24, Math.min(screenX(x1), view.width) - 24);
       const y = axis ? screenY(first[1]) - 4 : Math.min(screenY(y0), view.height) - 6;
       if (!axis || (y > 44 && y < view.height - 52)) write(number, x, y, look("--soft"));
     }
@@ -116,6 +116,8 @@ const drawFronts = () => {
   const placed = [], colour = look("--front");
   pen.font = "12px system-ui, 'Liberation Sans', sans-serif";
   pen.textAlign = "center";
+  // away from the names of the parallels, and from the buttons
+  const left = Math.max(0, screenX(west)) + 66, right = Math.min(view.width - 60, screenX(east) - 24);
   for (const { hours, parts } of frontLines) {
     pen.strokeStyle = colour;
     pen.lineWidth = 1.3;
@@ -123,7 +125,7 @@ const drawFronts = () => {
     let best = null, room = 46;
     for (const [x, y, xx, yy] of parts) {
       const px = screenX((x + xx) / 2), py = screenY((y + yy) / 2);
-      if (px < 60 || px > view.width - 60 || py < 40 || py > view.height - 40) continue;
+      if (px < left || px > right || py < 40 || py > view.height - 40) continue;
       const free = Math.min(200, ...placed.map(([a, b]) => Math.hypot(a - px, b - py)));
       if (free > room) { room = free; best = [px, py]; }
     }

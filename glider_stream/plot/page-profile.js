@@ -4,7 +4,8 @@ const DEEP = 2.5; // a seabed so many times deeper than the route would leave no
 const flat = (name) => legs.flatMap((leg) => leg[name]).filter((value) => value !== null);
 const deepest = flat("depth").reduce((a, b) => Math.max(a, b), 1);
 const grounds = flat("seabed"), near = grounds.reduce((a, b) => Math.min(a, b), Infinity);
-const lowest = near < DEEP * deepest
+const grounded = near < DEEP * deepest;
+const lowest = grounded
   ? Math.max(1.12 * deepest, 1.06 * Math.min(grounds.reduce((a, b) => Math.max(a, b), 0), DEEP * deepest))
   : 1.12 * deepest;
 let plot = { width: 1, height: 1 };
@@ -46,7 +47,7 @@ const drawProfile = () => {
     stretch = [];
   };
   for (const leg of legs)
-    leg.seabed.forEach((ground, i) => (ground === null ? close() : stretch.push([leg.t[i], ground])));
+    leg.seabed.forEach((ground, i) => (ground === null || !grounded ? close() : stretch.push([leg.t[i], ground])));
   close();
   profilePieces = pieces.map(({ leg, from, to, time }) => {
     const { t, depth } = legs[leg];

@@ -122,4 +122,5 @@ def draw_space(ax: Any, terrain: Terrain, frame: Frame, nodes: Array, ticks: int
 def stretch(frame: Frame) -> str:
     """How many times depth is stretched in `draw_space`, in words."""
     times = HEIGHT * max(frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]) / (frame.bottom - frame.top)
-    return f"depth stretched {times:.2g} times" if times > 1.05 else "depth to scale"
+    said = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    return f"depth stretched {said} times" if times > 1.05 else "depth to scale"

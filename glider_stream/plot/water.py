@@ -80,7 +80,8 @@ def frame_of(problem: "Problem", points: Array) -> Frame:
     """The frame that holds a problem's box and the points (n, 3) [m]."""
     low, high = np.minimum(problem.lo, points.min(axis=0)), np.maximum(problem.hi, points.max(axis=0))
     x, y = (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
-    top, bottom = float(-high[2]) + 0.0, float(-low[2])
+    # a path that surfaces ends a rounding above it
+    top, bottom = max(0.0, float(-high[2])), float(-low[2])
     unit, name = length_unit(x, y)
     labels = (f"East ({name})", f"North ({name})")
     if problem.to_lonlat is not None:
