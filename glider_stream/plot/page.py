@@ -148,21 +148,23 @@ def _seabed(flow: Flow, terrain: Terrain, frame: Frame) -> dict[str, Any] | None
 
 
 def _legs(flow: Flow, terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
-    steps, known = along(path), known_until(flow, terrain)
     most = max(FEWEST, MOST_ROWS // len(path.legs))
+    kept = [leg.trajectory[thinned(len(leg.trajectory), most)] for leg in path.legs]
+    rows = np.concatenate(kept)
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known_until(flow, terrain))
+    last = np.cumsum([len(some) for some in kept])
+    means = _means(path)
     legs = []
     for n, leg in enumerate(path.legs):
-        rows = leg.trajectory[thinned(len(leg.trajectory), most)]
-        mine = steps.leg == n
-        known_speed = bool(mine.any())
-        u, v, over = (float(a[mine].mean()) if known_speed else math.nan for a in (steps.u, steps.v, steps.speed))
+        rows = kept[n]
+        over, u, v = means[n]
         legs.append(
             {
                 "t": _numbers(rows[:, 0], 1),
                 "x": _numbers(rows[:, 1], 1),
                 "y": _numbers(rows[:, 2], 1),
                 "depth": _numbers(-rows[:, 3], 1),
-                "seabed": _numbers(-sample_bottom(terrain, rows[:, 1], rows[:, 2], known), 0),
+                "seabed": _numbers(seabed[last[n] - len(rows) : last[n]], 0),
                 "depart": round(leg.depart, 1),
                 "duration": round(leg.duration, 1),
                 "glide": round(math.degrees(leg.glide_angle), 2),
@@ -171,10 +173,17 @@ def _legs(flow: Flow, terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
                 "miss": round(leg.miss, 3),
                 "ground": _numbers(np.array([over]), 3)[0],
                 "current": _numbers(np.array([u, v]), 4),
-                "ends": None if leg.lonlat is None else np.round(leg.lonlat, 6).tolist(),
             }
         )
     return legs
+
+
+def _means(path: "Path") -> Array:
+    """Mean speed over ground and current u, v [m/s] of each leg, (legs, 3), NaN where one has no step."""
+    steps, count = along(path), len(path.legs)
+    sums = [np.bincount(steps.leg, weights=some, minlength=count) for some in (steps.speed, steps.u, steps.v)]
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.array(sums) / np.bincount(steps.leg, minlength=count)).T)
 
 
 def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:
