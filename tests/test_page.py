@@ -305,6 +305,7 @@ setTimeout(() => {{
   }}
   said.width = inner.documentElement.scrollWidth;
   said.track = inner.querySelectorAll("#track path").length;
+  said.ground = inner.querySelector("#profile .ground").getAttribute("d");
   out.id = "said";
   out.textContent = JSON.stringify(said);
   document.body.append(out);
@@ -313,8 +314,11 @@ setTimeout(() => {{
 
 
 @needs_browser
-def test_a_phone_shows_it_in_one_column(sea, tmp_path):
-    seen = browse(PHONE.format(page=html.escape(sea.read_text("utf-8"))), tmp_path)
+def test_a_phone_shows_it_in_one_column(tmp_path):
+    scene = ocean_scene()
+    scene.terrain = scene.terrain._replace(bottom=np.minimum(scene.terrain.bottom, 0.0) * 0.5 - 1.0)
+    file = written(tmp_path, scene)
+    seen = browse(PHONE.format(page=html.escape(file.read_text("utf-8"))), tmp_path)
     said = json.loads(html.unescape(re.findall(r'<pre id="said">(.*?)</pre>', seen.dom, re.DOTALL)[0]))
     assert said["width"] <= 375
     assert said["track"] > 60
@@ -324,3 +328,13 @@ def test_a_phone_shows_it_in_one_column(sea, tmp_path):
     left, top, right, bottom = said["closer"]
     assert min(right - left, bottom - top) >= 40  # for a thumb
     assert not seen.console
+    x, y = np.array(re.findall(r"[\d.]+", said["ground"]), float).reshape(-1, 2).T
+    assert x.min() < 60 < 300 < x.max()
+    kept = [(leg["t"], leg["seabed"]) for leg in held(file)["legs"]]
+    time, seabed = (np.concatenate(some) for some in zip(*kept, strict=True))
+    assert seabed.max() < 800
+    # the outline begins and ends at the bottom of the panel, and follows the seabed in between
+    expected = np.polynomial.Polynomial.fit(seabed, y[1:-1], 1)
+    np.testing.assert_allclose(expected(seabed), y[1:-1], atol=0.01)
+    np.testing.assert_allclose(np.interp(time, [0.0, time[-1]], [x[1], x[-2]]), x[1:-1], atol=0.01)
+    assert expected.deriv()(0.0) > 0
