@@ -63,7 +63,7 @@ const run = () => {
   at("theme").click();
   draw();
   said.dark = [document.documentElement.dataset.theme, pixel(LAND), shown("#track path")[0].stroke];
-  said.rows = at("table").tBodies[0].rows.length;
+  said.rows = [...at("table").tBodies[0].rows].map((row) => { row.click(); return at("leg-title").textContent; });
   said.resources = performance.getEntriesByType("resource").map((one) => one.name);
   said.width = [document.documentElement.scrollWidth, innerWidth];
   const out = document.createElement("pre");
