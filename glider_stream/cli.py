@@ -199,14 +199,17 @@ def verify(roadmap: Path, sample: int, as_json: bool) -> None:
 @cli.command()
 @ROADMAP
 @click.argument("path", required=False, type=FILE)
-@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG, PDF, or HTML for a page.")
+@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
 @click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
-@click.option("--fronts", type=float, metavar="HOURS", help="The chart with what is reached every so many hours.")
-def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], fronts: float | None) -> None:
+@click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
+@click.option("--fronts", type=float, metavar="HOURS", help="As --chart, with what is reached every HOURS.")
+def plot(
+    roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], chart: bool, fronts: float | None
+) -> None:
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None, fronts)
+    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts)
     click.echo(output)
 
 

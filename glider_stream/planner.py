@@ -20,7 +20,7 @@ from .jobs import Job, build_file, shard_of
 from .jobs import merge as merge_parts
 from .path import Path, load_path
 from .query import Planner, check_unchanged
-from .roadmap import Problem, Progress, Roadmap, build_roadmap, node_positions
+from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .score import Score
 from .score import score as score_of
@@ -253,19 +253,34 @@ def plot(
     path: str | File | Path | None = None,
     output: str | File | None = None,
     depths: Sequence[float] | None = None,
+    *,
+    chart: bool = False,
     fronts: float | None = None,
 ) -> "Figure | None":
     """Draw a path over its roadmap and the current at some `depths` [m], or the roadmap where there is none.
 
-    A path file or object; up to four depths for a path, one for a roadmap. `fronts` [h] draws the pilot's
-    chart instead: what can be reached every so many hours, headings, speeds. Written where `output` says; an
-    .html is a page with the route on a map and a profile, and no figure.
+    A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path by
+    time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written where
+    `output` says; one that ends in .html is a page to look around in, and no figure is returned.
     """
-    from .plot import check_figure, check_page, plot_chart, plot_roadmap, plot_route, save_figure
+    from .plot import (
+        PAGE,
+        check_figure,
+        fronts_of,
+        placed,
+        plot_chart,
+        plot_roadmap,
+        plot_route,
+        save_figure,
+        save_page,
+    )  # fmt: skip
 
-    as_page = output is not None and File(output).suffix.lower() == ".html"
+    as_page = output is not None and File(output).suffix.lower() == PAGE
     if output is not None:
-        (check_page if as_page else check_figure)(output)
+        check_output(output) if as_page else check_figure(output)
+    needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
+    chart = chart or as_page or fronts is not None
+    require(path is not None or not chart, f"{needs} needs a path, got none; give the file that `query -o` wrote")
     road = info(roadmap)
     title = "" if isinstance(roadmap, Roadmap) else File(roadmap).stem
     route = path if path is None or isinstance(path, Path) else load_path(path)
@@ -281,36 +296,21 @@ def plot(
         stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
         here = bool(problem.evaluator.allowed(stops, problem.departure).all())
         require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
-        if as_page:
-            assert output is not None
-            _write_page(flow, terrain, problem, road, route, depths, title, output)
-            return None
-        if fronts is None:
-            figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+        if chart:
+            route, every = placed(route, problem), None
+            if fronts is not None:
+                arrival = Planner(road, problem).arrivals(route.start)
+                every = (fronts_of(road.position, arrival, terrain), fronts)
+            if as_page:
+                assert output is not None
+                save_page(output, flow, terrain, problem, road.position, route, depths, every, title)
+                return None
+            figure = plot_chart(flow, terrain, problem, route, depths, every, title)
         else:
-            require(depths is None, f"the chart with fronts is drawn at the surface; got depths {depths}")
-            arrival = Planner(road, problem).arrivals(route.start)
-            figure = plot_chart(flow, terrain, problem, road.position, arrival, route, fronts, title)
+            figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
     if output is not None:
         save_figure(figure, output)
     return figure
-
-
-def _write_page(
-    flow: Any,
-    terrain: Any,
-    problem: Problem,
-    road: Roadmap,
-    route: Path,
-    depths: Sequence[float] | None,
-    title: str,
-    output: str | File,
-) -> None:
-    from .plot import page_depths, route_page, save_page
-
-    save_page(
-        route_page(flow, terrain, problem, route, page_depths(problem, road.position, depths), title), output
-    )
 
 
 def plot_steering(

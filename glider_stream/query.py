@@ -1,7 +1,7 @@
 """Queries: Dijkstra over a roadmap, a start and a goal attached to it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -332,17 +332,20 @@ class Planner:
         cost = self._cost(hops)
         return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs, self._unit)
 
+    def _north(self, point: Array) -> float:
+        to_lonlat = self.problem.to_lonlat
+        return 0.0 if to_lonlat is None else true_north(to_lonlat, point)
+
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
 
-    def _north(self, point: Array) -> float:
-        """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
-        ends = self._lonlat(point, point + np.array([0.0, 1.0, 0.0]))
-        if ends is None:
-            return 0.0
-        east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
-        return math.atan2(east, north)
+
+def true_north(to_lonlat: Callable[[Array], Array], point: Array) -> float:
+    """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
+    ends = to_lonlat(np.stack([point, point + np.array([0.0, 1.0, 0.0])]))
+    east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
+    return math.atan2(east, north)
 
 
 def _connected(attached: Attached) -> Attached:
