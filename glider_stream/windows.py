@@ -75,4 +75,6 @@ def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
         places = np.vstack([np.column_stack([at, rows[:, 3]])[inside], edges])
         low, high = places.min(axis=0), places.max(axis=0)
         (west, south, bottom), (east, north, top) = low.tolist(), high.tolist()
+        # a leg may miss the surface by the tolerance, and a vehicle does not leave the water
+        top, bottom = min(top, 0.0), min(bottom, 0.0)
         yield Window(start, end, west, south, east, north, 0.0 - top, 0.0 - bottom, path.lonlat is not None)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -43,7 +44,7 @@ def test_each_box_is_what_the_vehicle_flies_through_and_no_more(search):
         for column, low, high in (
             (x, box.west, box.east),
             (y, box.south, box.north),
-            (-z, box.shallowest, box.deepest),
+            (np.maximum(-z, 0), box.shallowest, box.deepest),
         ):
             # tight to what a vehicle goes between two of the moments that were looked at
             assert -SAGITTA <= column[inside].min() - low <= 0.6
@@ -78,6 +79,14 @@ def test_a_vehicle_that_goes_straight_down_has_a_window_with_an_inside(tmp_path)
     area = shapely.geometry.shape(feature["geometry"])
     assert area.is_valid
     assert 0 < area.area < 1e-9
+
+
+def test_no_vehicle_leaves_the_water(search):
+    path = search.query()
+    legs = tuple(replace(leg, trajectory=leg.trajectory + np.array([0, 0, 0, 3.0])) for leg in path.legs)
+    [box] = windows(replace(path, legs=legs))
+    assert box.shallowest == 0
+    assert box.deepest == pytest.approx(-path.trajectory[:, 3].min() - 3)
 
 
 def test_windows_as_a_table(tmp_path):
