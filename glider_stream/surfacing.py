@@ -36,26 +36,28 @@ class Surfacing:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """How many states of either measure there are."""
-        return 1 if self.most_yos is None else self.most_yos + 1, 1 if self.most_hours is None else BINS + 1
+        """How many states of either measure there are: half-yos, in which it dives and climbs by turns; time."""
+        return 1 if self.most_yos is None else 2 * self.most_yos, 1 if self.most_hours is None else BINS + 1
 
     def holds(self, path: Path) -> bool:
         """Whether a path keeps the rule, each leg's time as it is."""
-        yos, hours = 0, 0.0
+        yos, hours, climbing = 0, 0.0, False
         for leg in path.legs:
-            yos, hours = yos + (leg.glide_angle > 0), hours + leg.duration / 3600
+            turns, climbing = leg.glide_angle > 0 and not climbing, leg.glide_angle > 0
+            yos, hours = yos + turns, hours + leg.duration / 3600
             if yos > (self.most_yos or math.inf) or hours > (self.most_hours or math.inf):
                 return False
             if leg.end[2] >= -SURFACE:
-                yos, hours = 0, 0.0
+                yos, hours, climbing = 0, 0.0, False
         return True
 
-    def steps(self, glide_angle: Array, time: Array) -> tuple[Index, Index]:
-        """By how much legs (n,) use up either measure: a climb ends a yo; time in parts of the most."""
-        yos = (glide_angle > 0).astype(np.int64) if self.most_yos is not None else np.zeros(len(time), np.int64)
+    def steps(self, half: int, glide_angle: Array, time: Array) -> tuple[Index, Index]:
+        """By how much legs (n,) use up either measure, in a half-yo (odd ones climb); time in parts."""
+        none = np.zeros(len(time), np.int64)
+        turns = none if self.most_yos is None else ((glide_angle > 0) != (half % 2 == 1)).astype(np.int64)
         if self.most_hours is None:
-            return yos, np.zeros(len(time), np.int64)
-        return yos, np.ceil(np.nan_to_num(time) / (3600 * self.most_hours / BINS) - 1e-9).astype(np.int64)
+            return turns, none
+        return turns, np.ceil(np.nan_to_num(time) / (3600 * self.most_hours / BINS) - 1e-9).astype(np.int64)
 
 
 class SurfacingPlanner(Planner):
@@ -101,13 +103,13 @@ class SurfacingPlanner(Planner):
 
 def _onward(rule: Surfacing, position: Array, used: Index, nodes: Index, outcomes: Array) -> tuple[Index, Index]:
     """Of legs to `nodes`, from a state `used` (2,): the states that they end in, and which keep the rule."""
-    yos, parts = rule.steps(outcomes[:, 3], outcomes[:, 1])
-    after = np.stack([used[0] + yos, used[1] + parts])
+    turns, parts = rule.steps(int(used[0]), outcomes[:, 3], outcomes[:, 1])
+    after = np.stack([used[0] + turns, used[1] + parts])
     counts = np.array(rule.counts)
     fits = (outcomes[:, 0] == Status.CONNECTED) & (after < counts[:, None]).all(axis=0)
     up = position[nodes, 2] >= -SURFACE
-    yo, part = np.where(up, 0, after)[:, fits]
-    return (yo * counts[1] + part) * len(position) + nodes[fits], np.flatnonzero(fits)
+    half, part = np.where(up, 0, after)[:, fits]
+    return (half * counts[1] + part) * len(position) + nodes[fits], np.flatnonzero(fits)
 
 
 def _layered(road: Roadmap, rule: Surfacing) -> Roadmap:

@@ -86,9 +86,13 @@ def test_a_rule_of_surfacing_survives(search):
     path = bound.query((-190.0, 190.0, 0.0), (160.0, -160.0, 0.0))
     assert rule.holds(path)
     assert not Surfacing(None, 0.1).holds(path)
-    # as the planner counts: a climb ends a yo, and this path climbs twice
-    assert Surfacing(2).holds(path)
-    assert not Surfacing(1).holds(path)
+    # two climbs on end are of one yo
+    assert Surfacing(1).holds(path)
+    up_and_down = replace(
+        path, legs=tuple(replace(path.legs[0], glide_angle=g) for g in (-0.4, 0.4, 0.3, -0.4, 0.4))
+    )
+    assert Surfacing(2).holds(up_and_down)
+    assert not Surfacing(1).holds(up_and_down)
     slow = SimpleNamespace(connect=lambda a, b: GOOD, rule=rule)
     late = replace(path, legs=tuple(replace(leg, duration=3600.0) for leg in path.legs))
     keeper = SurfacingPlanner(roadmap(), search.problem, slow.rule)
