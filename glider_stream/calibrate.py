@@ -28,7 +28,7 @@ KEYS: dict[type[Glider], tuple[str, str, str]] = {
 }
 """By model: the keys of parasite drag, induced drag and lift."""
 INSTRUMENTS = ("vertical", "horizontal", "glide_angle", "pitch")
-DETERMINED = 0.3
+DETERMINED = 0.25
 """A relative standard error beyond it is no determination: the coefficient is held instead."""
 OUTLYING = 3.0
 """Scatters away from the fit that make a dive worth a look."""
@@ -167,7 +167,7 @@ def _volumes(dives: Dives, volumes: Array) -> tuple[float, float]:
 
 def _ranged(glider: Glider, base: Glider, angle: Array) -> Glider:
     """The glider over the preset's range and the flown angles [degrees], as far as the kernels can take them."""
-    limit = math.degrees(max(map(abs, glider.feasible_limits())))
+    limit = math.degrees(max(map(abs, glider.limits)))
     high = max(base.angles[1], math.ceil(float(angle.max())))
     low = max(min(base.angles[0], math.floor(float(angle.min()))), math.ceil(limit + 0.5))
     while True:

@@ -190,6 +190,8 @@ def _check_signs(
         odd = part & (np.sign(values) != np.sign(values[part][:1].sum()))
         if odd.any():
             number, value = line[odd][0], values[odd][0]
-            raise InputError(
-                f"line {number} of {name}: {column} = {value:g} has the other sign than its phase before; mend it"
-            )
+            where = f"line {number} of {name}: {column} = {value:g}"
+            raise InputError(f"{where} has another sign than the dives of its phase before it; mend it")
+    if down is not None and 0 < down.sum() < down.size and (values < 0).all():
+        where = f"line {line[~down][0]} of {name}: {column} = {values[~down][0]:g}"
+        raise InputError(f"{where} is below 0 in a climb as in a dive; mend its sign, or the phase")

@@ -20,6 +20,8 @@ REWEIGHTED = 10
 """At most so often are instruments weighed anew."""
 STEP = 1e-5
 """Of a logarithm, for the Jacobian: far above what the models are solved to."""
+CLOSE = 1e-7
+"""Of logarithms and of the sum of squares: a fit is found."""
 FURTHEST_MAIN = 3.5
 FURTHEST = {"induced_drag": 3.0, "drag_alpha2": 3.0, "lift": 1.5, "lift_alpha": 1.5}
 """How far ln(value / preset's) may go: of a buoyancy or a parasite drag; of others."""
@@ -86,7 +88,9 @@ class Problem:
                 return distances(self.flown(names, logs), self.kinds, self.dives, scale)[0].ravel()
 
             steps = np.full(len(names), STEP)
-            found = least_squares(residuals, logs, bounds=(-far, far), x_scale=0.1, diff_step=steps)
+            found = least_squares(
+                residuals, logs, bounds=(-far, far), x_scale=0.1, diff_step=steps, xtol=CLOSE, ftol=CLOSE
+            )
             logs, jac = np.asarray(found.x), np.asarray(found.jac)
             off, tangent = distances(self.flown(names, logs), self.kinds, self.dives, scale)
             # what is left of each residual when the dive's angle and the parameters are taken from it

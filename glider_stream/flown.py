@@ -17,7 +17,7 @@ DENSITY = 1024.0
 """Of sea water [kg/m^3], where a model has none, to make a mass of a volume; that of the preset `slocum`."""
 STEEP = (89.0, 89.9)
 """A range of angles [degrees] that no coefficients in reach of a fit make infeasible."""
-MASS_NODES = 6
+MASS_NODES = 3
 """Volumes at which a glider is evaluated where each dive has its own; a polynomial in ln(volume) between."""
 NEAREST_STEPS = 3
 
@@ -44,7 +44,7 @@ class Flown:
         self.volumes = volumes
         own = np.unique(volumes)
         if own.size > MASS_NODES:
-            # Chebyshev's nodes: speed is close to a power of the volume, the angle of attack hardly changes
+            # Chebyshev's nodes: the speed is nearly a power of the volume, the angle of attack hardly changes
             low, high = np.log(own[[0, -1]])
             place = np.cos(np.pi * (np.arange(MASS_NODES) + 0.5) / MASS_NODES)
             own = np.exp(0.5 * (low + high) + 0.5 * (high - low) * place)
@@ -55,7 +55,7 @@ class Flown:
                 self.weight[n] *= (at - logs[m]) / (logs[n] - logs[m])
         self.gliders = [vehicle(base, values, volume, volume) for volume in own]
         # a little inside, where rounding leaves a glide
-        self.flattest = max(abs(one.feasible_limits()[0]) for one in self.gliders) + 1e-9
+        self.flattest = max(abs(one.limits[0]) for one in self.gliders) + 1e-9
 
     def within(self, angle: Array) -> Array:
         """The nearest angles that can be flown."""
@@ -64,7 +64,7 @@ class Flown:
     def speed(self, angle: Array) -> Array:
         """V [m/s]."""
         speeds = [one.speed(-angle) for one in self.gliders]
-        return np.asarray((self.weight * speeds).sum(axis=0))
+        return np.asarray(np.exp((self.weight * np.log(speeds)).sum(axis=0)))
 
     def attack(self, angle: Array) -> Array:
         """The angle of attack [rad]."""
