@@ -20,7 +20,7 @@ demo: install
 	@echo "The roadmap is demo/seed-box.h5, the route demo/path.json; look at demo/route.png and demo/roadmap.png"
 
 test: install
-	$(RUN)/python -m pytest
+	$(RUN)/python -m pytest -n 2 --dist worksteal
 
 bench: install
 	$(RUN)/glider-stream bench --against benchmarks/records/bench.json

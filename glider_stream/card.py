@@ -10,6 +10,7 @@ import numpy as np
 from .kernels.flow import velocities
 from .path import Leg, Path
 from .roadmap import Problem
+from .waypoints import SURFACE
 
 DAY = 86_400.0
 
@@ -31,14 +32,30 @@ class Row:
     outrun: bool
     arrives: float
 
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return {
+            "duration_s": self.duration,
+            "arrives_s": self.arrives,
+            "over_ground_mps": self.over_ground,
+            "over_ground_km_per_day": daily(self.over_ground),
+            "toward_goal_km_per_day": self.toward_goal,
+            "current_along_mps": self.along,
+            "current_across_mps": self.across,
+            "fastest_current_mps": self.fastest,
+            "outrun": self.outrun,
+        }
+
 
 @dataclass(frozen=True)
 class Card:
-    """The route's legs, and the whole."""
+    """The route's legs, and the whole; `under` water from one surfacing to the next [s]; `best` speed [m/s]."""
 
     path: Path
     legs: tuple[Row, ...]
     whole: Row
+    under: tuple[float, ...]
+    best: float
 
     def _when(self, seconds: float) -> str:
         if self.path.departs is None:
@@ -47,25 +64,41 @@ class Card:
 
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON."""
-        return {"legs": [vars(row) for row in self.legs], "whole": vars(self.whole)}
+        return {
+            "legs": [row.as_dict() for row in self.legs],
+            "whole": self.whole.as_dict(),
+            "surface_to_surface_s": list(self.under),
+            "best_horizontal_mps": self.best,
+        }
 
     def __str__(self) -> str:
-        head = "leg   hours  over ground   along   across   to goal    fastest   arrives"
+        head = "leg   hours  over ground             along   across     to goal    fastest   arrives"
         lines = [head, *(self._line(f"{n:3}", row) for n, row in enumerate(self.legs, 1))]
         lines.append(self._line("all", self.whole))
+        if self.under:
+            times = "" if len(self.under) == 1 else f" {len(self.under)} times, {min(self.under) / 3600:.2f} to"
+            lines.append(f"surface to surface:{times} {max(self.under) / 3600:.2f} h")
+        else:
+            lines.append("surface to surface: the route does not surface twice")
         outrun = [str(n) for n, row in enumerate(self.legs, 1) if row.outrun]
         if outrun:
             lines.append(
-                f"* the water is faster than the vehicle: no holding station on legs {', '.join(outrun)}"
+                f"* the water is faster than the vehicle's {self.best:.2f} m/s: "
+                f"no holding station on legs {', '.join(outrun)}"
             )
         return "\n".join(lines)
 
     def _line(self, name: str, row: Row) -> str:
         return (
-            f"{name}  {row.duration / 3600:6.1f}  {row.over_ground:6.2f} m/s  {row.along:+7.2f}  "
-            f"{row.across:+7.2f}  {row.toward_goal:5.1f} km/d  "
+            f"{name}  {row.duration / 3600:6.2f}  {row.over_ground:6.2f} m/s {daily(row.over_ground):6.1f} km/d  "
+            f"{row.along:+7.2f}  {row.across:+7.2f}  {row.toward_goal:6.1f} km/d  "
             f"{row.fastest:5.2f}{'*' if row.outrun else ' '} m/s  {self._when(row.arrives)}"
         )
+
+
+def daily(speed: float) -> float:
+    """A speed [m/s] in km/day."""
+    return speed * DAY / 1000
 
 
 def card(path: Path, problem: Problem) -> Card:
@@ -73,19 +106,24 @@ def card(path: Path, problem: Problem) -> Card:
     best = float(problem.evaluator.polar.best_horizontal.max())
     legs = tuple(_row(leg, path, problem, best) for leg in path.legs)
     if not legs:
-        return Card(path, (), Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0))
+        return Card(path, (), Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0), (), best)
     time = np.array([row.duration for row in legs])
-    share = time / max(float(time.sum()), 1e-9)
+    total = max(float(time.sum()), 1e-9)
     over_ground, along, across = (
-        float(np.dot(share, [getattr(row, name) for row in legs])) for name in ("over_ground", "along", "across")
+        float(np.dot(time / total, [getattr(row, name) for row in legs]))
+        for name in ("over_ground", "along", "across")
     )
     gained = _distance(path.start, path.goal) - _distance(path.legs[-1].trajectory[-1, 1:4], path.goal)
-    total = float(time.sum())
     fastest = max(row.fastest for row in legs)
     outrun = any(row.outrun for row in legs)
-    return Card(
-        path, legs, Row(total, over_ground, along, across, gained / total * DAY / 1000, fastest, outrun, total)
-    )
+    whole = Row(total, over_ground, along, across, daily(gained / total), fastest, outrun, total)
+    return Card(path, legs, whole, _under(path), best)
+
+
+def _under(path: Path) -> tuple[float, ...]:
+    """Times [s] from one surfacing to the next."""
+    ends = [(0.0, path.start[2]), *((leg.depart + leg.duration, leg.end[2]) for leg in path.legs)]
+    return tuple(float(time) for time in np.diff([when for when, z in ends if z >= -SURFACE]))
 
 
 def _distance(a: Any, b: Any) -> float:
@@ -94,6 +132,7 @@ def _distance(a: Any, b: Any) -> float:
 
 def _row(leg: Leg, path: Path, problem: Problem, best: float) -> Row:
     rows = leg.trajectory
+    # a leg is planned, and traced, in the water of the roadmap's departure
     times = problem.departure + rows[:, 0] - rows[0, 0]
     current = velocities(problem.evaluator.flow, *(np.ascontiguousarray(rows[:, n]) for n in (1, 2, 3)), times)
     way = rows[-1, 1:3] - rows[0, 1:3]
@@ -110,7 +149,7 @@ def _row(leg: Leg, path: Path, problem: Problem, best: float) -> Row:
         over_ground=far / time,
         along=float(mean @ ahead),
         across=float(mean @ [-ahead[1], ahead[0]]),
-        toward_goal=gained / time * DAY / 1000,
+        toward_goal=daily(gained / time),
         fastest=fastest,
         outrun=fastest > best,
         arrives=leg.depart + leg.duration,

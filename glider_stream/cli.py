@@ -113,10 +113,13 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @click.option(
     "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
 )
+@click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
+@click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
 @click.option(
     "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
+@click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
 @click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
 @JSON
 def query(
@@ -125,24 +128,31 @@ def query(
     goal: Any,
     outputs: tuple[Path, ...],
     most_energy: float | None,
+    most_yos: int | None,
+    most_hours: float | None,
     thin: float | None,
     as_card: bool,
+    window_hours: float | None,
     front: bool,
     as_json: bool,
 ) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
     from . import planner
 
+    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
     if front:
-        if outputs or most_energy is not None:
+        alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+        if not alone:
             raise click.UsageError(
-                "--trade-off goes with neither --output nor --most-energy; leave one of them out"
+                "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
+                "leave one of them out"
             )
         said: Any
         corners = planner.trade_off(roadmap, start, goal)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin)
+        hours = {} if window_hours is None else {"window_hours": window_hours}
+        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None, **hours)
         said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
@@ -189,13 +199,17 @@ def verify(roadmap: Path, sample: int, as_json: bool) -> None:
 @cli.command()
 @ROADMAP
 @click.argument("path", required=False, type=FILE)
-@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF.")
+@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
 @click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
-def plot(roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...]) -> None:
+@click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
+@click.option("--fronts", type=float, metavar="HOURS", help="As --chart, with what is reached every HOURS.")
+def plot(
+    roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], chart: bool, fronts: float | None
+) -> None:
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None)
+    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts)
     click.echo(output)
 
 

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .kernels import cost
 from .settings import require
 
 Array = NDArray[np.float64]
@@ -18,9 +19,9 @@ class TravelTime:
 
     unit: ClassVar[str] = "s"
 
-    def leg(self, time: ArrayLike) -> Array:
-        """The cost of legs of some duration [s]; it rises with it, so the fastest control is the cheapest."""
-        return np.asarray(time, np.float64)
+    def kernel(self) -> cost.Cost:
+        """As the kernels read it; a cost rises with time, so the fastest control is the cheapest."""
+        return cost.Cost(1.0, 0.0)
 
     def inflection(self, z: ArrayLike) -> Array | None:
         """What a turn from dive to climb costs at heights z [m]; None where turns are free."""
@@ -55,9 +56,9 @@ class Energy:
         within = min(share) > 0 and max(share) <= 1
         require(within, f"the shares of `cost.efficiency` must be above 0, at most 1; got {list(share)}")
 
-    def leg(self, time: ArrayLike) -> Array:
+    def kernel(self) -> cost.Cost:
         """As TravelTime says."""
-        return self.hotel * np.asarray(time, np.float64) + self.trim
+        return cost.Cost(float(self.hotel), float(self.trim))
 
     def inflection(self, z: ArrayLike) -> Array | None:
         """As TravelTime says."""

@@ -153,7 +153,6 @@ class Evaluator:
             kernel = refine.refine_nodes if refines else connect.connect_nodes
             task = partial(kernel, self.medium, self.steering.kernel(), *pairs, result)
             in_parallel(task, sources.size, NODES_AT_ONCE)
-        result[:, 2] = self.cost.leg(result[:, 1])
         return result
 
     def _connect_by_fan(self, nodes: Array, departs: Array, sources: Index, rows: Index, targets: Index) -> Array:
@@ -169,7 +168,7 @@ class Evaluator:
     @property
     def medium(self) -> edges.Medium:
         """As the kernels read it."""
-        return edges.Medium(self.flow, self.terrain, self.polar, self.integration.kernel())
+        return edges.Medium(self.flow, self.terrain, self.polar, self.integration.kernel(), self.cost.kernel())
 
     @property
     def flies_backward(self) -> bool:
@@ -226,7 +225,6 @@ class Evaluator:
                 break
             room = int(counts.max())
         rows = found[np.arange(room) < counts[:, None]]
-        rows[:, 3] = self.cost.leg(rows[:, 2])
         first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         return first, rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
 

@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from datetime import timedelta
+from functools import partial
 from pathlib import Path as File
 from typing import Any
 from xml.etree import ElementTree as Xml
@@ -19,7 +20,7 @@ from .seaglider import targets
 from .settings import require
 from .slocum import list_number, mission_files
 from .store import check_output, replacing
-from .windows import windows
+from .windows import HOURS, Window, windows
 
 Texts = dict[str, str]
 
@@ -85,7 +86,11 @@ def _mean_current(leg: Leg) -> tuple[float, float]:
 
 
 def _csv(path: Path, name: str) -> Texts:
-    rows, text = list(_rows(path)), io.StringIO(newline="")
+    return _table(list(_rows(path)), name)
+
+
+def _table(rows: list[dict[str, Any]], name: str) -> Texts:
+    text = io.StringIO(newline="")
     table = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     table.writeheader()
     table.writerows(rows)
@@ -153,21 +158,37 @@ def _gpx(path: Path, name: str) -> Texts:
     return _xml(root, name)
 
 
-def _windows(path: Path, name: str) -> Texts:
-    """A polygon for each twelve hours."""
+def _said(path: Path, window: Window) -> dict[str, Any]:
+    """When a window is, and how deep the vehicle is there."""
+    return {
+        "from": _when(path, window.start) or round(window.start, 1),
+        "to": _when(path, window.end) or round(window.end, 1),
+        "depth_min": round(window.shallowest, 2),
+        "depth_max": round(window.deepest, 2),
+    }
+
+
+def _windows_geojson(path: Path, name: str, hours: float) -> Texts:
+    """A polygon for each window; at the date line it is cut in two, as RFC 7946 asks (3.1.9)."""
     features = []
-    for window in windows(path):
-        ring = [(window.west, window.south), (window.east, window.south), (window.east, window.north)]
-        ring += [(window.west, window.north), (window.west, window.south)]
-        properties = {
-            "from": _when(path, window.start) or window.start,
-            "to": _when(path, window.end) or window.end,
-            "depth_min": round(window.shallowest, 2) + 0.0,
-            "depth_max": round(window.deepest, 2),
-        }
-        shape = {"type": "Polygon", "coordinates": [[[round(x, 7), round(y, 7)] for x, y in ring]]}
-        features.append({"type": "Feature", "geometry": shape, "properties": properties})
+    for window in windows(path, hours):
+        rings = [[[[w, s], [e, s], [e, n], [w, n], [w, s]]] for w, s, e, n in window.outline()]
+        shape: dict[str, Any] = {"type": "Polygon", "coordinates": rings[0]}
+        if len(rings) > 1:
+            shape = {"type": "MultiPolygon", "coordinates": rings}
+        features.append({"type": "Feature", "geometry": shape, "properties": _said(path, window)})
     return {name: json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"}
+
+
+def _windows_csv(path: Path, name: str, hours: float) -> Texts:
+    """A row for each window; west of it is above east where it crosses the date line."""
+    sides = ("x_min", "y_min", "x_max", "y_max") if path.lonlat is None else ("west", "south", "east", "north")
+    rows = []
+    for window in windows(path, hours):
+        boxes = window.outline()
+        box = [round(bound, 6) for bound in (*boxes[0][:2], *boxes[-1][2:])]
+        rows.append({**dict(zip(sides, box, strict=True)), **_said(path, window)})
+    return _table(rows, name)
 
 
 EXPORTS: dict[str, Callable[[Path, str], Texts]] = {
@@ -178,10 +199,11 @@ EXPORTS: dict[str, Callable[[Path, str], Texts]] = {
     ".csv": _csv,
     ".ma": mission_files,
     "targets": targets,
-    ".windows.geojson": _windows,
+    ".windows.geojson": partial(_windows_geojson, hours=HOURS),
+    ".windows.csv": partial(_windows_csv, hours=HOURS),
 }
 """By a file's ending, or its name: what writes it; a form may need more than one file."""
-ANYWHERE = (".json", ".csv")
+ANYWHERE = (".json", ".csv", ".windows.csv")
 """The forms that need no longitude and latitude."""
 
 
@@ -201,10 +223,10 @@ def check_export(file: str | File) -> None:
     check_output(file)
 
 
-def export_path(path: Path, file: str | File) -> list[File]:
+def export_path(path: Path, file: str | File, window_hours: float = HOURS) -> list[File]:
     """Write a path in the form that the file's ending names; returns the files that it took.
 
-    Where there is no path only JSON says so; no file of another form is written.
+    Where there is no path only JSON says so; no file of another form is written. Windows last `window_hours`.
     """
     check_export(file)
     form, place = _form(file), File(file)
@@ -212,7 +234,8 @@ def export_path(path: Path, file: str | File) -> list[File]:
     require(geographic, f"the route file {file} needs longitude and latitude; plan in a geographic scenario")
     if not path.legs and form != ".json":
         return []
-    texts = EXPORTS[form](path, place.name)
+    write = EXPORTS[form]
+    texts = write(path, place.name, hours=window_hours) if isinstance(write, partial) else write(path, place.name)
     for name in texts:
         check_output(place.with_name(name))
     for name, text in texts.items():

@@ -78,6 +78,7 @@ class Path:
 
     From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
     `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, if that is known.
+    `unthinned`: how many legs and seconds it had before it was thinned.
     """
 
     start: Array
@@ -88,6 +89,7 @@ class Path:
     departs: datetime | None = None
     unit: str = "s"
     why: str = ""
+    unthinned: tuple[int, float] | None = None
 
     @property
     def found(self) -> bool:
@@ -107,11 +109,15 @@ class Path:
     def as_dict(self) -> dict[str, Any]:
         """As the path file has it."""
         energy = {"energy_j": self.cost} if self.found and self.unit == "J" else {}
+        thinned = {}
+        if self.unthinned is not None:
+            thinned = {"unthinned": {"legs": self.unthinned[0], "travel_time_s": self.unthinned[1]}}
         return {
             "found": self.found,
             "travel_time_s": self.travel_time if self.found else None,
             "cost": self.cost if self.found else None,
             **energy,
+            **thinned,
             "legs": [leg.as_dict() for leg in self.legs],
         }
 
@@ -128,6 +134,8 @@ class Path:
         hours = f" ({self.travel_time / 3600:.1f} h)" if self.travel_time >= 7200 else ""
         energy = f", {self.cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s{hours}{energy}"
+        if self.unthinned is not None:
+            title += f"; before it was thinned {self.unthinned[0]}, {self.unthinned[1]:,.0f} s"
         return "\n".join([title, *(f"  {leg}" for leg in self.legs)])
 
 

@@ -26,9 +26,12 @@ from .score import Score
 from .score import score as score_of
 from .settings import require
 from .store import check_output, read_roadmap, replacing
+from .surfacing import Surfacing, SurfacingPlanner
 from .thin import thin as thinned
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
+from .waypoints import SURFACE
+from .windows import HOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -138,17 +141,22 @@ def query(
     outputs: Sequence[str | File] = (),
     most_energy: float | None = None,
     thin: float | None = None,
+    surfacing: Mapping[str, Any] | None = None,
+    window_hours: float = HOURS,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
     These are x, y, z [m], z upward, or lon, lat [degrees], depth [m] where the domain is geographic; the
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
     for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
-    near the straight line, where one glide does.
+    near the straight line, where one glide does, and none where that breaks another rule. `surfacing`
+    is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. Exported
+    windows last `window_hours`.
     """
     for output in outputs:
         check_export(output)
-    search, ends = _search(roadmap, start, goal)
+    rule = None if surfacing is None else Surfacing(**surfacing)
+    search, ends = _search(roadmap, start, goal, rule)
     if most_energy is None:
         path = search.query(*ends)
     else:
@@ -160,10 +168,20 @@ def query(
         )
         path = front.within(most_energy) or replace(last, cost=math.inf, legs=(), why=why)
     if thin is not None:
-        path = thinned(path, thin, search.connect, search.fly)
+        path = _with_fewer_legs(path, thin, search, most_energy)
     for output in outputs:
-        export_path(path, output)
+        export_path(path, output, window_hours)
     return path
+
+
+def _with_fewer_legs(path: Path, tolerance: float, search: Planner, most_energy: float | None) -> Path:
+    """A path thinned, or as it is where fewer legs would break what else was asked for."""
+    rule = search.rule if isinstance(search, SurfacingPlanner) else Surfacing()
+    bound = rule != Surfacing()
+    stays = (lambda stop: bool(stop[2] >= -SURFACE)) if bound else (lambda stop: False)
+    fewer = thinned(path, tolerance, search.connect, search.fly, stays)
+    keeps = rule.holds(fewer) and (most_energy is None or fewer.cost <= most_energy)
+    return fewer if keeps else replace(path, unthinned=fewer.unthinned)
 
 
 def trade_off(roadmap: str | File | Roadmap, start: Point | None = None, goal: Point | None = None) -> TradeOff:
@@ -186,22 +204,30 @@ def card(roadmap: str | File | Roadmap, path: Path) -> Card:
 def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
     """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in a roadmap's water."""
     drawn = read_drawn(route)
-    search, _ = _search(roadmap, None, None)
+    # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
+    search, _ = _search(roadmap, None, None, Surfacing())
     domain = scenario_from_text(search.roadmap.provenance.scenario).domain
-    ours = File(route).suffix.lower() == ".json" and isinstance(domain, GeographicDomain)
-    points = [np.array(point) if ours else domain.point(point) for point in drawn]
+    on_globe = isinstance(domain, GeographicDomain)
+    cure = "and the roadmap is in metres; give x, y, z in a CSV file"
+    require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
+    points = [domain.point(place) if drawn.geographic else np.array(place) for place in drawn.places]
     for n, point in enumerate(points, 1):
         search.problem.check_point(point, f"point {n}")
-    return score_of(points, search.connect, search.query)
+    return score_of(points, search.connect, search.query, search.fly)
 
 
 def _search(
-    roadmap: str | File | Roadmap, start: Point | None, goal: Point | None
+    roadmap: str | File | Roadmap, start: Point | None, goal: Point | None, rule: Surfacing | None = None
 ) -> tuple[Planner, tuple[Array | None, Array | None]]:
     road = info(roadmap)
     scenario = scenario_from_text(road.provenance.scenario)
     ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
-    return Planner(road, scenario.problem()), (ends[0], ends[1])
+    if rule is None and scenario.query is not None:
+        rule = Surfacing(scenario.query.most_yos, scenario.query.most_hours)
+    problem = scenario.problem()
+    free = rule is None or rule == Surfacing()
+    search = Planner(road, problem) if free or rule is None else SurfacingPlanner(road, problem, rule)
+    return search, (ends[0], ends[1])
 
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":
@@ -227,15 +253,34 @@ def plot(
     path: str | File | Path | None = None,
     output: str | File | None = None,
     depths: Sequence[float] | None = None,
-) -> "Figure":
+    *,
+    chart: bool = False,
+    fronts: float | None = None,
+) -> "Figure | None":
     """Draw a path over its roadmap and the current at some `depths` [m], or the roadmap where there is none.
 
-    A path file or object; up to four depths for a path, one for a roadmap. Written where `output` says.
+    A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path by
+    time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written where
+    `output` says; one that ends in .html is a page to look around in, and no figure is returned.
     """
-    from .plot import check_figure, plot_roadmap, plot_route, save_figure
+    from .plot import (
+        PAGE,
+        check_figure,
+        fronts_of,
+        placed,
+        plot_chart,
+        plot_roadmap,
+        plot_route,
+        save_figure,
+        save_page,
+    )  # fmt: skip
 
+    as_page = output is not None and File(output).suffix.lower() == PAGE
     if output is not None:
-        check_figure(output)
+        check_output(output) if as_page else check_figure(output)
+    needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
+    chart = chart or as_page or fronts is not None
+    require(path is not None or not chart, f"{needs} needs a path, got none; give the file that `query -o` wrote")
     road = info(roadmap)
     title = "" if isinstance(roadmap, Roadmap) else File(roadmap).stem
     route = path if path is None or isinstance(path, Path) else load_path(path)
@@ -245,12 +290,24 @@ def plot(
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     if route is None:
         require(depths is None or len(depths) == 1, f"a roadmap is drawn at one depth; got {depths}")
+        require(fronts is None and not as_page, "fronts, and pages, are of a route; give its path file")
         figure = plot_roadmap(flow, terrain, problem, road, None if depths is None else depths[0], title)
     else:
         stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
         here = bool(problem.evaluator.allowed(stops, problem.departure).all())
         require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
-        figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+        if chart:
+            route, every = placed(route, problem), None
+            if fronts is not None:
+                arrival = Planner(road, problem).arrivals(route.start)
+                every = (fronts_of(road.position, arrival, terrain), fronts)
+            if as_page:
+                assert output is not None
+                save_page(output, flow, terrain, problem, road.position, route, depths, every, title)
+                return None
+            figure = plot_chart(flow, terrain, problem, route, depths, every, title)
+        else:
+            figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
     if output is not None:
         save_figure(figure, output)
     return figure

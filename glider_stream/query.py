@@ -1,7 +1,7 @@
 """Queries: Dijkstra over a roadmap, a start and a goal attached to it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,6 +21,9 @@ from .settings import require
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
+FLOWN_AGAIN = 0.1
+"""By how much a leg that is flown again may miss by more than the tolerance, in tolerances: as in verify."""
 NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 
 
@@ -40,7 +43,7 @@ def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
 
 
 @dataclass(frozen=True)
-class _End:
+class End:
     """An end of a query: its `point` (3,) [m], the nodes that lie there, often none, else its legs."""
 
     point: Array
@@ -67,7 +70,7 @@ class _Search:
     A state is a node, where turns are free; else a node and how it was come to, by a dive or by a climb.
     """
 
-    start: _End
+    start: End
     blend: Blend
     origin: int
     cost: Array
@@ -109,13 +112,33 @@ class Planner:
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
 
+    def arrivals(self, start: ArrayLike | None = None) -> Array:
+        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        search = self._search(self._start(start), Blend(0.0, 1.0))
+        nodes = len(self.roadmap.position)
+        return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
+
     def connect(self, start: Array, end: Array) -> Edge:
-        """One glide between two points (3,) [m], as the roadmap's method finds it."""
-        return self.problem.evaluator.connect_pair(start, end, self.problem.departure)
+        """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.
+
+        A line or a surface of controls finds few of the glides that there are; what it says of a pair that
+        the flow map does not join either stays.
+        """
+        evaluator, departure = self.problem.evaluator, self.problem.departure
+        edge = evaluator.connect_pair(start, end, departure)
+        if edge.status in EXACT_MAY_FIND and evaluator.by_fan() is not evaluator:
+            exact = evaluator.by_fan().connect_pair(start, end, departure)
+            return exact if exact.status == Status.CONNECTED else edge
+        return edge
 
     def fly(self, hops: list[tuple[Array, Array, Edge]]) -> Path:
-        """The path of some legs: from, to, edge."""
-        return self._path(hops[0][0], hops[-1][1], hops)
+        """The path of some legs, from, to, edge, flown again; InputError where one does not end where it says."""
+        path = self._path(hops[0][0], hops[-1][1], hops)
+        most = (1 + FLOWN_AGAIN) * self.problem.evaluator.integration.tolerance
+        for n, leg in enumerate(path.legs, 1):
+            off = math.dist(leg.trajectory[-1, 1:], leg.end)
+            require(off <= most, f"leg {n} ends {off:.1f} m from where it should; `verify` the roadmap")
+        return path
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
         """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
@@ -152,13 +175,13 @@ class Planner:
     def _legs(self) -> Legs:
         return self.problem.legs(self.roadmap.position)
 
-    def _start(self, point: ArrayLike | None) -> _End:
+    def _start(self, point: ArrayLike | None) -> End:
         nodes, place = self._place(point, self.problem.start, "start")
-        return _End(place, nodes, None if nodes.size else _connected(self._legs.away(place)))
+        return End(place, nodes, None if nodes.size else _connected(self._legs.away(place)))
 
-    def _goal(self, point: ArrayLike | None) -> _End:
+    def _goal(self, point: ArrayLike | None) -> End:
         nodes, place = self._place(point, self.problem.goal, "goal")
-        return _End(place, nodes, None if nodes.size else _connected(self._legs.towards(place)))
+        return End(place, nodes, None if nodes.size else _connected(self._legs.towards(place)))
 
     def _place(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
         """The nodes that lie at an end of the query, often none, and where it is."""
@@ -205,7 +228,7 @@ class Planner:
         """How many states a node has."""
         return 1 if self._graph[3] is None else 2
 
-    def _search(self, start: _End, blend: Blend) -> _Search:
+    def _search(self, start: End, blend: Blend) -> _Search:
         """Dijkstra's algorithm from a start."""
         (ways, target, indptr, turn), cost = self._graph, self._costs(blend)
         states, first, last = len(indptr) - 2, len(ways), len(ways)
@@ -222,7 +245,7 @@ class Planner:
         distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
         return _Search(start, blend, origin, distance[0], before[0])
 
-    def _direct(self, start: _End, goals: Sequence[_End]) -> list[Edge]:
+    def _direct(self, start: End, goals: Sequence[End]) -> list[Edge]:
         """The legs from end to end; between nodes the roadmap has said what there is."""
         asked = [n for n, end in enumerate(goals) if start.legs is not None or end.legs is not None]
         points = np.array([start.point, *(goals[n].point for n in asked)])
@@ -233,7 +256,7 @@ class Planner:
             legs[n] = _edge(row)
         return legs
 
-    def _way(self, search: _Search, goal: _End, direct: Edge) -> Path:
+    def _way(self, search: _Search, goal: End, direct: Edge) -> Path:
         """The path to a goal, by nodes or directly."""
         start_at, goal_at = search.start.point, goal.point
         if np.array_equal(start_at, goal_at):
@@ -254,7 +277,7 @@ class Planner:
             state = earlier
         return self._path(start_at, goal_at, hops[::-1])
 
-    def _through(self, search: _Search, goal: _End) -> tuple[float, int, Edge | None]:
+    def _through(self, search: _Search, goal: End) -> tuple[float, int, Edge | None]:
         """The least cost of a way to a goal by nodes, inf where there is none; its last state, and a last leg."""
         phases = self._phases
         nodes = goal.nodes if goal.legs is None else goal.legs.nodes
@@ -309,17 +332,20 @@ class Planner:
         cost = self._cost(hops)
         return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs, self._unit)
 
+    def _north(self, point: Array) -> float:
+        to_lonlat = self.problem.to_lonlat
+        return 0.0 if to_lonlat is None else true_north(to_lonlat, point)
+
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
 
-    def _north(self, point: Array) -> float:
-        """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
-        ends = self._lonlat(point, point + np.array([0.0, 1.0, 0.0]))
-        if ends is None:
-            return 0.0
-        east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
-        return math.atan2(east, north)
+
+def true_north(to_lonlat: Callable[[Array], Array], point: Array) -> float:
+    """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
+    ends = to_lonlat(np.stack([point, point + np.array([0.0, 1.0, 0.0])]))
+    east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
+    return math.atan2(east, north)
 
 
 def _connected(attached: Attached) -> Attached:

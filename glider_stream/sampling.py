@@ -1,5 +1,6 @@
 """Node samplers: where a roadmap's nodes lie in a box."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,6 +13,10 @@ from .settings import require
 Array = NDArray[np.float64]
 Allowed = Callable[[Array], NDArray[np.bool_]]
 """Which of the points (n, 3) [m] a node may lie at."""
+
+
+MOST_NODES = 10_000_000
+"""More fit in no memory that a roadmap has."""
 
 
 class Sampler(Protocol):
@@ -101,8 +106,50 @@ class HaltonSampler(RandomSampler):
         return np.asarray(qmc.Halton(3, rng=np.random.default_rng(self.seed)).random(count))
 
 
-SAMPLERS: dict[str, type[GridSampler | RandomSampler]] = {
+@dataclass(frozen=True)
+class YoSampler:
+    """Nodes at the `depths` [m] that yos turn at, even in x and y: every `spacing` [m], or `per_leg` to a leg.
+
+    A leg's length is that of the fastest glide between the depths furthest apart, dz / tan(gamma).
+    """
+
+    depths: tuple[float, ...]
+    spacing: float | None = None
+    per_leg: float | None = None
+    seed = 0
+
+    def __post_init__(self) -> None:
+        fits = len(self.depths) >= 2 and self.depths[0] >= 0 and bool((np.diff(self.depths) > 0).all())
+        require(fits, f"`sampling.depths` must be two or more, rising from 0 m or below; got {list(self.depths)}")
+        given = [value for value in (self.spacing, self.per_leg) if value is not None]
+        require(len(given) == 1, "`sampling` needs `spacing` [m] or `per_leg`, one of them")
+        require(given[0] > 0, f"`sampling.spacing`, or `per_leg`, must be above 0; got {given[0]:g}")
+
+    def for_glide(self, angle: float) -> "YoSampler":
+        """The same with its spacing known: `angle` [rad] is that of the fastest glide."""
+        if self.per_leg is None:
+            return self
+        leg = float(np.diff(self.depths).max()) / math.tan(angle)
+        return YoSampler(self.depths, spacing=leg / self.per_leg)
+
+    def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
+        """As Sampler says; x outermost, z innermost, from the shallowest down."""
+        assert self.spacing is not None
+        deepest, most = max(self.depths), -float(lo[2])
+        require(deepest <= most, f"`sampling.depths` reach {deepest:g} m, the domain {most:g} m; deepen it")
+        counts = [max(1, int((hi[n] - lo[n]) / self.spacing)) for n in range(2)]
+        size = counts[0] * counts[1] * len(self.depths)
+        fits = size <= MOST_NODES
+        require(fits, f"nodes every {self.spacing:g} m would be {size:,}, more than {MOST_NODES:,}; take fewer")
+        x, y = (lo[n] + (np.arange(k) + 0.5) / k * (hi[n] - lo[n]) for n, k in enumerate(counts))
+        points = np.stack(np.meshgrid(x, y, -np.array(self.depths), indexing="ij"), axis=-1).reshape(-1, 3)
+        points = points + 0.0  # no depth of -0
+        return np.asarray(points[allowed(points)])
+
+
+SAMPLERS: dict[str, type[GridSampler | RandomSampler | YoSampler]] = {
     "grid": GridSampler,
+    "yo": YoSampler,
     "uniform": RandomSampler,
     "sobol": SobolSampler,
     "halton": HaltonSampler,

@@ -22,7 +22,7 @@ from .neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .ocean import OceanFlow
 from .ocean.bottom import Bottom
 from .roadmap import Problem
-from .sampling import SAMPLERS, Sampler
+from .sampling import SAMPLERS, Sampler, YoSampler
 from .settings import from_kinds, from_table, require
 from .terrain import TerrainSettings, raster_terrain
 from .toml import to_toml
@@ -57,11 +57,16 @@ KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
 
 @dataclass(frozen=True)
 class QueryPoints:
-    """`start` and `goal` in the domain's coordinates; gliders leave every node at `departure` [s]."""
+    """`start` and `goal` in the domain's coordinates; gliders leave every node at `departure` [s].
+
+    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule.
+    """
 
     start: Point
     goal: Point
     departure: float = 0.0
+    most_yos: int | None = None
+    most_hours: float | None = None
 
     def __post_init__(self) -> None:
         fits = abs(self.departure) <= LONGEST
@@ -99,9 +104,15 @@ class Scenario:
         words += f", at most {flow.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
             words += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
+        sampler = self.sampler
+        if isinstance(sampler, YoSampler):
+            sampler = sampler.for_glide(float(table.best_angle.max()))
+        if frame is not None and isinstance(self.domain, GeographicDomain):
+            error = frame.scale_error(self.domain.lon, self.domain.lat)
+            words += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
         return Problem(
             evaluator=Evaluator(flow, terrain, table, self.method, self.integration, self.cost),
-            sampler=self.sampler,
+            sampler=sampler,
             law=self.law,
             lo=lo,
             hi=hi,

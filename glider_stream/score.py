@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .kernels.edges import Edge, Status
 from .path import Path
+from .thin import Hop, hops_of
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,8 @@ REASONS = {
     Status.NO_HIT: "no glide angle and heading lead there; move the stop with the current, or change its depth",
     Status.BLOCKED: "every glide there touches land, seabed or a keep-out area; move it into open water",
     Status.OUTSIDE_FLOW: "one of its ends lies outside the current's grid; stay within the domain",
-    Status.SAME_DEPTH: "one glide changes depth, and its ends lie at the same",
+    Status.SAME_DEPTH: "one glide changes depth and its ends lie at the same, and the roadmap has no way between;"
+    " put a stop at another depth between",
 }
 """Why a leg fails, and what to try."""
 
@@ -30,17 +32,23 @@ class ScoredLeg:
 
     start: Array
     end: Array
+    status: Status
     time: float | None
     glides: int
-    why: str
+
+    @property
+    def why(self) -> str:
+        """Why it fails, and what to try; empty where it does not."""
+        return "" if self.time is not None else REASONS[self.status]
 
 
 @dataclass(frozen=True)
 class Score:
-    """The legs up to the first that fails."""
+    """The legs up to the first that fails, of `asked`; `flown`, all their glides, where there are any."""
 
     legs: tuple[ScoredLeg, ...]
     asked: int
+    flown: Path | None
 
     @property
     def flyable(self) -> bool:
@@ -57,38 +65,61 @@ class Score:
         return {
             "flyable": self.flyable,
             "travel_time_s": self.time if self.flyable else None,
-            "legs": [{"time_s": leg.time, "glides": leg.glides, "why": leg.why or None} for leg in self.legs],
+            "legs": [
+                {
+                    "from": leg.start.tolist(),
+                    "to": leg.end.tolist(),
+                    "status": leg.status.name.lower(),
+                    "time_s": leg.time,
+                    "glides": leg.glides,
+                    "why": leg.why or None,
+                }
+                for leg in self.legs
+            ],
         }
 
     def __str__(self) -> str:
-        lines = []
-        for n, leg in enumerate(self.legs, 1):
-            said = (
-                f"{leg.time:9,.0f} s, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
-                if leg.time is not None
-                else "fails"
-            )
-            lines.append(f"  leg {n:3}  {said}")
         if self.flyable:
-            return "\n".join([f"the route takes {self.time:,.0f} s", *lines])
-        return "\n".join([f"leg {len(self.legs)} of {self.asked} fails: {self.legs[-1].why}", *lines])
+            title = f"the route takes {self.time:,.0f} s"
+        else:
+            failed = self.legs[-1]
+            name = failed.status.name.lower().replace("_", " ")
+            title = f"leg {len(self.legs)} of {self.asked} fails: {failed.why} ({name})"
+        glides = iter(() if self.flown is None else self.flown.legs)
+        lines = [title]
+        for n, leg in enumerate(self.legs, 1):
+            said = "fails"
+            if leg.time is not None:
+                said = f"{leg.time:,.0f} s, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
+            if leg.status == Status.SAME_DEPTH and leg.glides:
+                said += " of the roadmap: one glide changes depth, and its ends lie at the same"
+            lines += [f"  leg {n}: {said}", *(f"    {next(glides)}" for _ in range(leg.glides))]
+        return "\n".join(lines)
 
 
 def score(
-    points: Sequence[Array], connect: Callable[[Array, Array], Edge], query: Callable[[Array, Array], Path]
+    points: Sequence[Array],
+    connect: Callable[[Array, Array], Edge],
+    query: Callable[[Array, Array], Path],
+    fly: Callable[[list[Hop]], Path],
 ) -> Score:
-    """Fly a drawn route: one glide between points at other depths, the best way of the roadmap between others."""
+    """Fly a drawn route: one glide between points at other depths, the best way of the roadmap between others.
+
+    `points` (3,) [m]. As in a query every glide is that of the roadmap's departure, whenever it begins.
+    """
     legs: list[ScoredLeg] = []
+    hops: list[Hop] = []
     for start, end in pairwise(points):
         if start[2] != end[2]:
             edge = connect(start, end)
-            reached = edge.status == Status.CONNECTED
-            why = "" if reached else REASONS[Status(int(edge.status))]
-            legs.append(ScoredLeg(start, end, edge.time if reached else None, int(reached), why))
+            status = Status(int(edge.status))
+            new = [(start, end, edge)] if status == Status.CONNECTED else []
+            found = bool(new)
         else:
-            way = query(start, end)
-            why = "" if way.found else "the roadmap has no way between its ends; more nodes may find one"
-            legs.append(ScoredLeg(start, end, way.travel_time if way.found else None, len(way.legs), why))
-        if legs[-1].time is None:
+            way, status = query(start, end), Status.SAME_DEPTH
+            new, found = hops_of(way), way.found
+        legs.append(ScoredLeg(start, end, status, sum(hop[2].time for hop in new) if found else None, len(new)))
+        if not found:
             break
-    return Score(tuple(legs), len(points) - 1)
+        hops += new
+    return Score(tuple(legs), len(points) - 1, fly(hops) if hops else None)

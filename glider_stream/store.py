@@ -145,6 +145,9 @@ class Guarded(io.FileIO):
                 self.error = error
         return whole
 
+    def flush(self) -> None:
+        """HDF5 asks for it; a file without a buffer has nothing to do."""
+
     def check(self) -> None:
         """Raise what went wrong."""
         if self.error is not None:

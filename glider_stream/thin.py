@@ -1,6 +1,8 @@
 """Thinning: fewer legs, each flown again before it is believed."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,31 +16,47 @@ Hop = tuple[Array, Array, Edge]
 
 
 def thin(
-    path: Path, tolerance: float, connect: Callable[[Array, Array], Edge], fly: Callable[[list[Hop]], Path]
+    path: Path,
+    tolerance: float,
+    connect: Callable[[Array, Array], Edge],
+    fly: Callable[[list[Hop]], Path],
+    stays: Callable[[Array], bool] = lambda stop: False,
 ) -> Path:
     """A route whose stops lie within `tolerance` [m] of the old one's (Ramer 1972, Douglas and Peucker 1973).
 
     A stretch becomes one leg where no stop of it lies further away from the straight line, and where one
-    glide joins its ends: `connect` says so. Else it is cut at its farthest stop. `fly` makes a path of legs.
+    glide joins its ends: `connect` says so. Else it is cut at its farthest stop. `fly` makes a path of legs,
+    those that stay flown again, too. A stop that `stays` is never left out.
     """
     require(0 <= tolerance < np.inf, f"a route is thinned to 0 m or more; got {tolerance:g}")
-    if len(path.legs) < 2:
+    if not path.legs:
         return path
-    stops = [path.legs[0].start, *(leg.end for leg in path.legs)]
-
-    def hops(first: int, last: int) -> list[Hop]:
+    old = hops_of(path)
+    stops = [old[0][0], *(end for _, end, _ in old)]
+    hops: list[Hop] = []
+    # stretches that wait, the next one last: a route may be longer than Python's stack is deep
+    fixed = [0, *(n for n in range(1, len(old)) if stays(stops[n])), len(old)]
+    waiting = list(pairwise(fixed))[::-1]
+    while waiting:
+        first, last = waiting.pop()
         if last - first == 1:
-            return [(stops[first], stops[last], _edge(path, first))]
+            hops.append(old[first])
+            continue
         off = _distances(np.array(stops[first + 1 : last]), stops[first], stops[last])
         if off.max() <= tolerance:
             edge = connect(stops[first], stops[last])
             if edge.status == Status.CONNECTED:
-                return [(stops[first], stops[last], edge)]
+                hops.append((stops[first], stops[last], edge))
+                continue
         # where all lie on the line the middle is as good a cut as any, and leaves less to try
         cut = first + 1 + (int(off.argmax()) if off.max() > 0 else len(off) // 2)
-        return hops(first, cut) + hops(cut, last)
+        waiting += [(cut, last), (first, cut)]
+    return replace(fly(hops), unthinned=(len(old), path.travel_time))
 
-    return fly(hops(0, len(stops) - 1))
+
+def hops_of(path: Path) -> list[Hop]:
+    """The legs of a path as `fly` takes them."""
+    return [(leg.start, leg.end, _edge(path, n)) for n, leg in enumerate(path.legs)]
 
 
 def _distances(points: Array, start: Array, end: Array) -> Array:

@@ -169,11 +169,12 @@ def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Veri
     angle = np.abs(road.glide_angle)
     direction = (road.glide_angle > 0).astype(np.intp)
     rise = position[target, 2] - position[source, 2]
+    price = evaluator.cost.kernel()
     in_water = evaluator.allowed(position, problem.departure)
     looks = {
         "lead to where they begin or to the same depth": (rise == 0) | (source == target),
         "climb where they should dive, or dive": np.sign(rise) != np.sign(road.glide_angle),
-        "cost something else than the scenario says": road.cost != evaluator.cost.leg(road.time),
+        "cost something else than the scenario says": road.cost != price.per_second * road.time + price.per_leg,
         "take no time or longer than the horizon": (road.time <= 0)
         | (road.time > horizon + evaluator.integration.dt),
         "have a glide angle outside the polar": (angle < polar.shallowest[direction] - 1e-9)

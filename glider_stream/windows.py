@@ -12,6 +12,9 @@ from .settings import require
 
 HOURS = 12.0
 """A window, unless said otherwise."""
+FINEST = 1e6
+"""Parts of a degree in which the edge of a window is said."""
+MOST_WINDOWS = 100_000
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,22 @@ class Window:
     north: float
     shallowest: float
     deepest: float
+    geographic: bool = False
+
+    def outline(self) -> list[tuple[float, float, float, float]]:
+        """West, south, east, north of what it covers within [-180, 180] degrees: two boxes at the date line.
+
+        Rounded outward, by 0.1 m at most, so that no box is empty. As they are where it is not geographic.
+        """
+        if not self.geographic:
+            return [(self.west, self.south, self.east, self.north)]
+        west, south = (math.floor(bound * FINEST) / FINEST for bound in (self.west, self.south))
+        east, north = ((math.floor(bound * FINEST) + 1) / FINEST for bound in (self.east, self.north))
+        turn = float(wrapped(west, 0.0)) - west
+        west, east = round(west + turn, 6), round(east + turn, 6)
+        if east <= 180:
+            return [(west, south, east, north)]
+        return [(west, south, 180.0, north), (-180.0, south, round(east - 360, 6), north)]
 
 
 def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
@@ -43,7 +62,11 @@ def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
         require(len(tracks) == len(path.legs), "the route does not know its longitudes; query it again")
         at = np.concatenate(tracks)
         at = np.column_stack([wrapped(at[:, 0], float(at[0, 0])), at[:, 1]])
-    count = max(1, math.ceil(rows[-1, 0] / (3600 * hours) - 1e-9))
+    asked = rows[-1, 0] / (3600 * hours)
+    require(
+        asked <= MOST_WINDOWS, f"windows of {hours:g} h are more than {MOST_WINDOWS:,} on this route; take longer"
+    )
+    count = max(1, math.ceil(asked - 1e-9))
     for n in range(count):
         start, end = 3600 * hours * n, min(3600 * hours * (n + 1), float(rows[-1, 0]))
         inside = (rows[:, 0] >= start) & (rows[:, 0] <= end)
@@ -52,4 +75,6 @@ def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
         places = np.vstack([np.column_stack([at, rows[:, 3]])[inside], edges])
         low, high = places.min(axis=0), places.max(axis=0)
         (west, south, bottom), (east, north, top) = low.tolist(), high.tolist()
-        yield Window(start, end, west, south, east, north, -top, -bottom)
+        # a leg may miss the surface by the tolerance, and a vehicle does not leave the water
+        top, bottom = min(top, 0.0), min(bottom, 0.0)
+        yield Window(start, end, west, south, east, north, 0.0 - top, 0.0 - bottom, path.lonlat is not None)

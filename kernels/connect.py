@@ -106,7 +106,7 @@ def _launch(medium, steering, position, departure, source, indptr, target, contr
         lanes[CONTROL, n] = at[NEXT]
         at[NEXT] += 1
         # controls come in order of arrival: from here on all are dearer
-        if edges[k, 0] == CONNECTED and edge_cost(first) >= edges[k, 2]:
+        if edges[k, 0] == CONNECTED and edge_cost(medium.cost, first) >= edges[k, 2]:
             at[NEXT] = at[COUNT]
             continue
         place(lanes, n, x, y, z, departure[p], c.u, c.v, c.w)
@@ -170,7 +170,7 @@ def _settle(medium, lanes, n, edge, chosen):
     duration = lanes[DURATION, n]
     if lanes[MISS, n] >= integration.tolerance:
         return chosen
-    cost = edge_cost(duration)
+    cost = edge_cost(medium.cost, duration)
     if edge[0] == CONNECTED and (cost, lanes[CONTROL, n]) >= (edge[2], chosen):
         return chosen
     x, y, z, t = lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n]

@@ -1,9 +1,18 @@
-"""What an edge costs: travel time [s]."""
+"""What an edge costs: so much for each second, so much for each leg."""
+
+from typing import NamedTuple
 
 from .cache import kernel
 
 
+class Cost(NamedTuple):
+    """`per_second` of a leg and `per_leg`, in the cost's own unit; travel time is 1 and 0."""
+
+    per_second: float
+    per_leg: float
+
+
 @kernel
-def edge_cost(duration):
+def edge_cost(cost, duration):
     """Cost of a leg from its duration [s]; it never falls as the duration grows."""
-    return duration
+    return cost.per_second * duration + cost.per_leg

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from .cache import inlined, kernel
 from .control import Polar, vertical_speed
+from .cost import Cost
 from .flow import Flow, contains
 from .motion import Integration
 from .terrain import Terrain
@@ -36,12 +37,13 @@ CLEARANCE_SPACING = 5.0
 
 
 class Medium(NamedTuple):
-    """Everything that decides an edge but its ends and the steering: flow, terrain, glide polar, integration."""
+    """Everything that decides an edge but its ends and the steering."""
 
     flow: Flow
     terrain: Terrain
     polar: Polar
     integration: Integration
+    cost: Cost
 
 
 class Edge(NamedTuple):

@@ -54,7 +54,9 @@ def checked_leg(medium, lanes, n):
         return no_edge(NO_HIT)
     if not is_clear(flow, medium.terrain, x, y, z, t, c.u, c.v, c.w, time, dt, CLEARANCE_SPACING):
         return no_edge(BLOCKED)
-    return Edge(CONNECTED, time, edge_cost(time), c.glide_angle, c.heading, c.speed, lanes[steer.MISS, n])
+    return Edge(
+        CONNECTED, time, edge_cost(medium.cost, time), c.glide_angle, c.heading, c.speed, lanes[steer.MISS, n]
+    )
 
 
 @making
@@ -119,7 +121,7 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
             if lanes[STATE, n] == OPEN and lanes[TIME, n] - SURE * abs(lanes[TIME, n] - before) <= deadline:
                 continue
             arrives = lanes[STATE, n] == HIT and lanes[TIME, n] <= deadline
-            if arrives and not (known and edge_cost(lanes[TIME, n]) >= row[2]):
+            if arrives and not (known and edge_cost(medium.cost, lanes[TIME, n]) >= row[2]):
                 edge = checked_leg(medium, lanes, n)
                 if edge.status == CONNECTED or (edge.status == BLOCKED and not known):
                     store(row, edge)
@@ -128,7 +130,7 @@ def polish(medium, position, origin, departure, backward, tasks, guesses, count,
             more = following[g] < begin[g + 1] and following[g] - begin[g] < MAX_TRIES
             if more and known:
                 guess = order[following[g]]
-                more = guesses[guess, OUTSIDE] <= INSIDE and edge_cost(time[guess]) < row[2]
+                more = guesses[guess, OUTSIDE] <= INSIDE and edge_cost(medium.cost, time[guess]) < row[2]
             if not more:
                 if taken == groups:
                     rest(lanes, n)

@@ -159,3 +159,18 @@ def within(position, point, radius):
     """The nodes at other depths within a radius [m], rising."""
     squared = squared_distances(position, point)
     return [n for n in range(len(position)) if position[n, 2] != point[2] and squared[n] <= radius**2]
+
+
+def flown(flow, leg, times):
+    """Where a leg's trim takes a vehicle (n, 3) [m], `times` (n,) [s] after it began, by scipy's DOP853.
+
+    The current is that at the leg's departure, t = 0: for steady flows.
+    """
+    along = leg.speed * math.cos(leg.glide_angle)
+    through = along * math.cos(leg.heading), along * math.sin(leg.heading)
+
+    def rate(t, at):
+        u, v = velocity(flow, *at, 0.0)
+        return [u + through[0], v + through[1], leg.speed * math.sin(leg.glide_angle)]
+
+    return solve_ivp(rate, (0, times[-1]), leg.start, "DOP853", times, rtol=1e-9, atol=1e-7, max_step=3.0).y.T

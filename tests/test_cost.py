@@ -11,6 +11,7 @@ from small import command, roadmap, scenario_file, strict_json
 from glider_stream import planner
 from glider_stream.cost import GRAVITY, PRESETS, Energy, TravelTime
 from glider_stream.errors import InputError
+from glider_stream.kernels.cost import edge_cost
 from glider_stream.query import Blend, Planner
 from glider_stream.roadmap import Roadmap
 from glider_stream.scenario import read_scenario
@@ -42,7 +43,8 @@ def test_the_pump_works_against_the_depth():
     assert ideal.inflection(-200.0) == pytest.approx(1005, abs=1)
     assert ideal.inflection(-1000.0) == pytest.approx(5030, abs=5)
     assert COST.inflection(0.0) == 0.0
-    assert COST.leg([10.0, 20.0]) == pytest.approx([25.0, 45.0])
+    assert edge_cost(COST.kernel(), 10.0) == 25.0
+    assert edge_cost(TravelTime().kernel(), 0.1 + 0.2) == 0.1 + 0.2
     assert TravelTime().inflection(-100.0) is None
     Energy(**{name: tuple(map(tuple, v)) if isinstance(v, list) else v for name, v in PRESETS["slocum"].items()})
 
@@ -58,7 +60,7 @@ def random_roadmap(seed, nodes=7):
     climbs = position[target, 2] > position[source, 2]
     base = roadmap()
     return replace(
-        base, position=position, target=target.astype(np.int32), time=time, cost=COST.leg(time),
+        base, position=position, target=target.astype(np.int32), time=time, cost=COST.hotel * time + COST.trim,
         indptr=np.concatenate([[0], np.cumsum(np.bincount(source, minlength=nodes))]),
         glide_angle=np.where(climbs, 0.5, -0.5), heading=0 * time, speed=0 * time + 0.5, miss=0 * time,
     )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from glider_stream.errors import InputError
-from glider_stream.export import EXPORTS, export_path
+from glider_stream.export import ANYWHERE, EXPORTS, export_path
 from glider_stream.frame import LocalFrame
 from glider_stream.path import Leg, Path
 from glider_stream.slocum import goto_list, lint, mission_files
@@ -220,7 +220,7 @@ def test_seaglider_targets(tmp_path):
     assert_places([(lon, lat, 0.0)], [[*STOPS[2][:2], 0.0]])
 
 
-@pytest.mark.parametrize("form", [form for form in EXPORTS if form not in (".json", ".csv")])
+@pytest.mark.parametrize("form", [form for form in EXPORTS if form not in ANYWHERE])
 def test_what_needs_a_place_on_the_globe_says_so(tmp_path, form):
     name = "goto_l10.ma" if form == ".ma" else form if form == "targets" else f"route{form}"
     with pytest.raises(InputError, match="longitude and latitude"):

@@ -20,7 +20,8 @@ FLOORS = {
     5: "dives flown fit calibration calibrate sampling neighbours edges legs",
     6: "roadmap path waypoints windows drawn difference",
     7: "lock store journal query change",
-    8: "trade_off card thin score slocum seaglider export plot progress describe verify cluster jobs baselines",
+    8: "slocum seaglider export plot progress describe verify cluster jobs baselines"
+    " surfacing trade_off card thin score",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

@@ -95,3 +95,30 @@ def test_without_pyproj_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(InputError, match=r"pip install glider-stream\[ocean\]"):
         LocalFrame(1.2345, 6.789).to_local(1.0, 6.0)
+
+
+@pytest.mark.parametrize("lat", [0.0, 70.0, -45.0])
+@pytest.mark.parametrize("lon", [10.0, 180.0])
+@pytest.mark.parametrize("width", [10e3, 100e3, 1000e3])
+def test_round_trips_and_velocities_in_domains_of_all_sizes(lon, lat, width):
+    """To a centimetre; and the frame's velocity against geodesics, within the error that the frame reports."""
+    half = width / 2
+    dlat, dlon = half / 111e3, half / 111e3 / math.cos(math.radians(lat))
+    frame = LocalFrame.over((lon - dlon, lon + dlon), (lat - dlat, lat + dlat))
+    error = frame.scale_error((lon - dlon, lon + dlon), (lat - dlat, lat + dlat))
+    rng = np.random.default_rng(7)
+    lons, lats = lon + rng.uniform(-dlon, dlon, 200), lat + rng.uniform(-dlat, dlat, 200)
+    x, y = frame.to_local(lons, lats)
+    back = frame.to_lonlat(x, y)
+    assert GEOD.inv(lons, lats, *back)[2].max() < CENTIMETRE
+    bearing, far = rng.uniform(0, 360, 200), 100.0
+    ahead = GEOD.fwd(lons, lats, bearing, np.full(200, far))[:2]
+    moved = np.stack(frame.to_local(*ahead)) - [x, y]
+    turn = frame.convergence(lons, lats)
+    east, north = np.sin(np.radians(bearing)), np.cos(np.radians(bearing))
+    told = far * np.stack(
+        [east * np.cos(turn) - north * np.sin(turn), east * np.sin(turn) + north * np.cos(turn)]
+    )
+    off = np.hypot(*(moved - told)) / far
+    assert off.max() <= error * 1.01 + 2e-5  # a chord of 100 m bends by as much
+    assert error < 0.01

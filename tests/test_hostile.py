@@ -3,6 +3,7 @@
 Few examples here; many with `GLIDER_STREAM_EXAMPLES=400 pytest tests/test_hostile.py`.
 """
 
+import json
 import os
 import resource
 import shutil
@@ -19,11 +20,16 @@ from small import SCENARIO, roadmap, scenario_file
 from test_jobs import interrupt, problem
 
 from glider_stream import planner
+from glider_stream.calibrate import calibrate, read_dives
+from glider_stream.drawn import read_drawn
 from glider_stream.errors import InputError, Stopped
+from glider_stream.frame import LocalFrame
 from glider_stream.jobs import Job, Shard, build_file, merge
+from glider_stream.ocean.bathymetry import read_bathymetry
 from glider_stream.path import load_path
 from glider_stream.scenario import read_scenario
 from glider_stream.store import read_part, read_roadmap, write_roadmap
+from glider_stream.terrain import read_polygons
 
 xr = pytest.importorskip("xarray")
 
@@ -63,6 +69,19 @@ def good(tmp_path_factory):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         data.to_zarr(place / "store.zarr")
+    height = xr.Dataset(
+        {"elevation": (("lat", "lon"), -300 * u[0], {"units": "m"})}, {k: axes[k] for k in ("lon", "lat")}
+    )
+    height.to_netcdf(place / "chart.nc", engine="scipy")
+    ring = [[5.2, 40.2], [5.4, 40.2], [5.4, 40.4], [5.2, 40.2]]
+    (place / "zones.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    (place / "dives.csv").write_text("w,u\n0.1,0.2\n0.11,0.21\n0.12,0.19\n0.1,0.22\n")
+    (place / "drawn.csv").write_text("lon,lat,depth\n5.1,40.1,0\n5.2,40.2,100\n5.3,40.3,0\n")
+    (place / "drawn.gpx").write_text(
+        '<gpx><rte><rtept lat="40.1" lon="5.1"/><rtept lat="40.2" lon="5.2"/></rte></gpx>'
+    )
+    line = "<coordinates>5.1,40.1,0 5.2,40.2,-100</coordinates>"
+    (place / "drawn.kml").write_text(f"<kml><Placemark><LineString>{line}</LineString></Placemark></kml>")
     return place
 
 
@@ -102,7 +121,14 @@ KINDS = {
     "three.nc": load_currents,
     "zarr.json": load_store,
     "kept.h5.journal": load_journal,
+    "chart.nc": lambda path: read_bathymetry(path, FRAME, (5.2, 5.5), (40.2, 40.5)),
+    "zones.geojson": lambda path: read_polygons(path, FRAME),
+    "dives.csv": lambda path: calibrate(read_dives(path)),
+    "drawn.csv": read_drawn,
+    "drawn.gpx": read_drawn,
+    "drawn.kml": read_drawn,
 }
+FRAME = LocalFrame(5.35, 40.35)
 SOURCES = {"parts.h5": "part.h5", "zarr.json": "store.zarr/uo/zarr.json"}
 CHANGES = some.lists(
     some.tuples(

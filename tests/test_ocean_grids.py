@@ -326,6 +326,32 @@ def pom():
     )
 
 
+def sigma_on_axes():
+    """Sigma levels over a regular grid whose rows go from north to south."""
+    sigma = -np.linspace(0, 1, 41)
+    lon, lat = np.meshgrid(LON, LAT)
+    h = 120 + 50 * (lon - 20.6) - 80 * (lat - 60.4)
+    depth = -(sigma[:, None, None] * h)[None]
+    dims = ("time", "sigma", "lat", "lon")
+    return xr.Dataset(
+        {
+            "water_u": (dims, spread("u", lon, lat, depth, along=False), {"units": "m/s"}),
+            "water_v": (dims, spread("v", lon, lat, depth, along=False), {"units": "m/s"}),
+            "bathy": (("lat", "lon"), h, {"units": "m"}),
+        },
+        {
+            "lon": ("lon", LON, {"units": "degrees_east"}),
+            "lat": ("lat", LAT, {"units": "degrees_north"}),
+            "sigma": (
+                "sigma",
+                sigma,
+                {"standard_name": "ocean_sigma_coordinate", "formula_terms": "sigma: sigma depth: bathy"},
+            ),
+            "time": ("time", HOURS, TIME),
+        },
+    ).isel(lat=slice(None, None, -1))
+
+
 def masked(land):
     """Plausible numbers on land, that only a mask tells from water."""
     data = plain(
@@ -377,6 +403,7 @@ MODELS = {
     "ROMS without an angle": lambda: [roms().drop_vars("angle")],
     "ROMS with land": lambda: [roms(land=True)],
     "POM: sigma levels, toward east": lambda: [pom()],
+    "sigma levels on axes, from the north": lambda: [sigma_on_axes()],
     "MITgcm: a C-grid on axes": lambda: [mitgcm()],
     "MOM6: q and h points": lambda: [mom6()],
     "MOM5: a B-grid, far west, noleap": lambda: [mom5()],
@@ -484,6 +511,13 @@ REFUSALS = {
     "no places": (lambda: [along(places=False)], "longitude"),
     "only u": (lambda: [nemo("u")], "no current toward north"),
     "POP without its own places": (lambda: [pop().drop_vars(["ULONG", "ULAT"])], "TLONG.*name `lon` and `lat`"),
+    "NEMO with the places of corners alone": (
+        lambda: [
+            nemo("u").rename(nav_lon="glamf", nav_lat="gphif"),
+            nemo("v").rename(nav_lon="glamf", nav_lat="gphif"),
+        ],
+        "does not lie at `glamf`.* name `lon` and `lat`",
+    ),
     "a mask that tells nothing": (
         lambda: [along().assign(mask=(("y", "x"), np.arange(NY * NX).reshape(NY, NX) % 2))],
         "`mask` .* name `land`",

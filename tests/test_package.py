@@ -79,6 +79,7 @@ def test_the_wheel_is_whole(tmp_path):
     folders = {"glider_stream/kernels": "kernels", "glider_stream/data": "data"}
     wanted = {f"{inside}/{p.name}" for inside, at in folders.items() for p in (ROOT / at).glob("*.[pt][yo]*")}
     wanted |= {str(p.relative_to(ROOT)) for p in (ROOT / "glider_stream").glob("**/*.py")}
+    wanted |= {str(p.relative_to(ROOT)) for p in (ROOT / "glider_stream" / "plot").glob("page*.[hcj]*")}
     assert held == wanted | {"glider_stream/py.typed", "glider_stream/data/references.json"}
 
 

@@ -176,9 +176,9 @@ def test_a_drawn_route(capsys, tmp_path, monkeypatch):
 @pytest.mark.parametrize("form", [".geojson", ".kml", ".gpx"])
 def test_our_own_exports_are_drawn_routes(tmp_path, form):
     export_path(route(), tmp_path / f"route{form}")
-    lon, lat, depth = np.array(read_drawn(tmp_path / f"route{form}")).T
+    lon, lat, depth = np.array(read_drawn(tmp_path / f"route{form}").places).T
     x, y = FRAME.to_local(lon, lat)
-    assert np.abs(np.stack([x, y, -depth], axis=-1) - np.array(STOPS[1:])).max() < 1.0
+    assert np.abs(np.stack([x, y, -depth], axis=-1) - np.array(STOPS)).max() < 1.0
 
 
 @pytest.mark.parametrize(
@@ -186,8 +186,8 @@ def test_our_own_exports_are_drawn_routes(tmp_path, form):
     [
         ("a.csv", "a,b\n1,2\n3,4\n", "its columns are a, b"),
         ("a.csv", "lon,lat\n1,2\n", "from 2 to 10,000 points; got 1"),
-        ("a.csv", "lon,lat\n1,2\n3,x\n", "cannot be read"),
-        ("a.csv", "lon,lat\n1,2\n3,nan\n", "point 2 of a.csv is not three numbers"),
+        ("a.csv", "lon,lat\n1,2\n3,x\n", "point 2 of a.csv must be three finite numbers"),
+        ("a.csv", "lon,lat\n1,2\n3,nan\n", "point 2 of a.csv must be three finite numbers"),
         ("a.geojson", '{"type": "Polygon", "coordinates": []}', "holds a Polygon"),
         ("a.geojson", "[" * 100_000, "cannot be read"),
         ("a.kml", "<kml>", "cannot be read"),

@@ -1,6 +1,7 @@
 import re
 import sys
 import tomllib
+from datetime import UTC, datetime
 from itertools import combinations, pairwise
 from pathlib import Path as FilePath
 from types import SimpleNamespace
@@ -53,7 +54,7 @@ def box_scene():
     mesh = np.meshgrid(side, side, [0.0, -100.0, -200.0, -300.0], indexing="ij")
     position = np.column_stack([m.ravel() for m in mesh])
     lo, hi = np.array([-450.0, -450, -300]), np.array([450.0, 450, 0])
-    problem = SimpleNamespace(lo=lo, hi=hi, departure=0.0, to_lonlat=None)
+    problem = SimpleNamespace(lo=lo, hi=hi, departure=0.0, to_lonlat=None, departs=None)
     depths = [0, 200, 100, 300, 0, 100, 300, 200, 300, 0]
     path = zigzag((-450, 450), (450, -450), depths, 1500.0, 60.0)
     return SimpleNamespace(
@@ -81,6 +82,7 @@ def ocean_scene():
     position = np.random.default_rng(1).uniform([lo, lo, -500], [hi, hi, 0], (1500, 3))
     position = position[plot.sample_water(terrain, *position.T)]
     box = {"lo": np.array([lo, lo, -500]), "hi": np.array([hi, hi, 0])}
+    box["departs"] = datetime(2024, 11, 20, 18, tzinfo=UTC)
     problem = SimpleNamespace(**box, departure=21600.0, to_lonlat=lambda at: at[:, :2] / 1e5 + [-18.5, 38.0])
     depths = [0, 480, 20, 500, 0, 450, 150, 500, 0]
     path = zigzag((-25e3, -20e3), (22e3, 25e3), depths, 72000.0, 2500.0)
@@ -121,7 +123,18 @@ def draw(name):
     if "many" in name:
         depths = [0, *np.tile([300, 50], 60), 0]
         scene.path = zigzag((-450, 450), (450, -450), depths, 5 * 86400.0, 5.0, rows=9)
+    if "chart" in name:
+        fronts = plot.fronts_of(scene.position, arrivals(scene), scene.terrain)
+        path, every = plot.placed(scene.path, scene.problem), 12.0 if "ocean" in name else 0.1
+        arguments = (scene.flow, scene.terrain, scene.problem, path)
+        return plot.plot_chart(*arguments, fronts=(fronts, every), title="A chart")
     return plot.plot_route(scene.flow, scene.terrain, scene.problem, scene.position, scene.path, title="A route")
+
+
+def arrivals(scene):
+    """As if there were no current: how far from the start, at a speed that crosses in the path's time."""
+    far = np.hypot(*(scene.position - scene.path.start)[:, :2].T)
+    return far / far.max() * 1.5 * scene.path.travel_time
 
 
 FIGURES = [
@@ -131,6 +144,8 @@ FIGURES = [
     "roadmap of a box",
     "roadmap of the ocean",
     "steering",
+    "chart in a box",
+    "chart of the ocean",
 ]
 
 
@@ -199,8 +214,8 @@ def test_panels_and_their_units_fit_the_scale(figures):
     assert "(b) Current at 0 m, t = 6 h" in titles(ocean)
     labels = [text for text, _ in written(ocean)]
     assert {
-        "East of 18.5000° W (km)",
-        "North of 38.0000° N (km)",
+        "Longitude (°)",
+        "Latitude (°)",
         "Depth (m)",
         "Time since departure (h)",
     } <= set(labels)

@@ -1,10 +1,12 @@
 """Samplers: in the box, as many as asked, the same for the same seed, never on land, evenly spread."""
 
+import math
+
 import numpy as np
 import pytest
 
 from glider_stream.errors import InputError
-from glider_stream.sampling import SAMPLERS, GridSampler, HaltonSampler, RandomSampler, SobolSampler
+from glider_stream.sampling import SAMPLERS, GridSampler, HaltonSampler, RandomSampler, SobolSampler, YoSampler
 
 LO, HI = np.array([-300.0, 50.0, -200.0]), np.array([100.0, 250.0, 0.0])
 every_random = pytest.mark.parametrize("sampler", [RandomSampler, SobolSampler, HaltonSampler])
@@ -119,4 +121,31 @@ def test_unusable_samplers_are_refused(make, said):
 
 
 def test_every_sampler_has_a_name():
-    assert set(SAMPLERS.values()) == {GridSampler, RandomSampler, SobolSampler, HaltonSampler}
+    assert set(SAMPLERS.values()) == {GridSampler, RandomSampler, SobolSampler, HaltonSampler, YoSampler}
+
+
+def test_yo_nodes_lie_where_yos_turn_as_dense_as_legs_are_long():
+    lo, hi = np.array([-5000.0, -3000.0, -700.0]), np.array([5000.0, 3000.0, 0.0])
+    sampler = YoSampler((0.0, 600.0), per_leg=2.0).for_glide(math.radians(37.5))
+    leg = 600.0 / math.tan(math.radians(37.5))
+    assert sampler.spacing == pytest.approx(leg / 2)
+    nodes = sampler.nodes(lo, hi, lambda points: points[:, 0] < 4000.0)
+    assert set(nodes[:, 2]) == {0.0, -600.0}
+    assert nodes[:, 0].max() < 4000.0
+    for n in range(2):
+        steps = np.diff(np.unique(nodes[:, n]))
+        assert steps.min() >= leg / 2
+        assert steps.max() < leg / 2 * 1.2
+    for wrong, words in (
+        ({"depths": (0.0, 600.0)}, "one of them"),
+        ({"depths": (0.0, 600.0), "spacing": 5.0, "per_leg": 1.0}, "one of them"),
+        ({"depths": (600.0,), "spacing": 5.0}, "two or more"),
+        ({"depths": (600.0, 0.0), "spacing": 5.0}, "rising"),
+        ({"depths": (0.0, 600.0), "spacing": 0.0}, "above 0"),
+    ):
+        with pytest.raises(InputError, match=words):
+            YoSampler(**wrong)
+    with pytest.raises(InputError, match="reach 900 m, the domain 700 m"):
+        YoSampler((0.0, 900.0), spacing=500.0).nodes(lo, hi, lambda points: points[:, 0] < 1)
+    with pytest.raises(InputError, match="take fewer"):
+        YoSampler((0.0, 600.0), spacing=0.001).nodes(lo, hi, lambda points: points[:, 0] < 1)

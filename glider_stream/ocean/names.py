@@ -82,8 +82,8 @@ AT_V = re.compile(r"(_v|lamv|phiv)$|^ul(on|at|ong)$|^xu_|^yu_|_c$|_q$", re.IGNOR
 """Coordinates of points where u and v are, where a file holds those of others, too."""
 ELSEWHERE = re.compile(r"(lam[ft]|phi[ft]|_psi|_t|_rho|^tl(on|at|ong))$", re.IGNORECASE)
 """Coordinates of the points of tracers and of corners."""
-TRACER, AT_CORNERS = re.compile(r"^tl(on|at|ong)$", re.IGNORECASE), re.compile(r"^[uv]vel$", re.IGNORECASE)
-"""POP's centres of cells, and its currents, which lie at their corners."""
+OTHERS = re.compile(r"^(tl(on|at|ong)|glam[ft]|gphi[ft]|geo(lon|lat)_t|(lon|lat)_psi)$", re.IGNORECASE)
+"""Coordinates at which no current is given, unless its own `coordinates` say so."""
 CF_AXES = {"longitude": "lon", "latitude": "lat", "vertical": "depth", "time": "time"}
 WORDS = {"lon": "longitude", "lat": "latitude", "depth": "depth", "time": "time"}
 SIGMA = re.compile(r"ocean_(s|sigma|double_sigma)")
@@ -278,12 +278,11 @@ class Catalogue:
             own = [name for name in every if name in self.coordinates(variable)]
             here = [name for name in every if (AT_U if component == "u" else AT_V).search(name)]
             hits = own if len(own) == 1 else here if len(here) == 1 else every
+            elsewhere = [name for name in hits if said != name and name not in own and OTHERS.match(name)]
             require(
-                not (
-                    hits and hits[0] not in own and TRACER.match(hits[0]) and AT_CORNERS.match(str(variable.name))
-                ),
-                f"`{variable.name}` in {self.name} lies at the corners of cells, but `{', '.join(hits)}` at "
-                "their centres: add the file that holds those of the corners, or name `lon` and `lat` in `names`",
+                not elsewhere,
+                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, places of cells' "
+                "centres or corners: add the file that holds its own, or name `lon` and `lat` in `names`",
             )
             require(
                 len(hits) < 2,

@@ -228,7 +228,8 @@ class _Reader:
         own_depths = depth
         floor = None
         if sigma is not None:
-            floor = self._over(sigma.depth, variable, horizontal)[rows][:, columns]
+            turns = np.s_[..., :: -1 if lat_turned else 1, :: -1 if lon_turned else 1]
+            floor = self._over(sigma.depth, variable, horizontal)[turns][rows][:, columns]
             # of the whole grid, so that both components get the same
             own_depths = fixed_depths(sigma, np.asarray(sigma.depth.values, np.float64))
         levels = slice(0, 1 if own_depths is None else own_depths.size)
@@ -270,7 +271,7 @@ class _Reader:
         if sigma is not None:
             assert floor is not None
             assert own_depths is not None
-            zeta = None if sigma.surface is None else self._over(sigma.surface, variable, horizontal)
+            zeta = None if sigma.surface is None else self._over(sigma.surface, variable, horizontal)[turns]
             wanted, fixed = own_depths[levels], []
             for n, layer in enumerate(values):
                 top: Array | float = 0.0

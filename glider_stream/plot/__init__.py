@@ -1,21 +1,35 @@
 """Figures: a route in its current, as the paper's figure 4 shows one; a roadmap, and steering, at a glance."""
 
+from .along import Along, along, placed
 from .canvas import check_figure, save_figure
+from .chart import plot_chart
 from .comparison import Mean, Series, plot_comparison
+from .fronts import Fronts, fronts_of
+from .page import PAGE, save_page
 from .roadmap import plot_roadmap
 from .route import plot_route
+from .seabed import sample_bottom
 from .steering import plot_steering
 from .water import sample_field, sample_water
 
 __all__ = [
+    "PAGE",
+    "Along",
+    "Fronts",
     "Mean",
     "Series",
+    "along",
     "check_figure",
+    "fronts_of",
+    "placed",
+    "plot_chart",
     "plot_comparison",
     "plot_roadmap",
     "plot_route",
     "plot_steering",
+    "sample_bottom",
     "sample_field",
     "sample_water",
     "save_figure",
+    "save_page",
 ]

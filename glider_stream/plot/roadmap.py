@@ -8,7 +8,8 @@ from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from .canvas import INK, colours, frozen, new_figure, said_time, styled, thinned, time_unit
-from .water import MAX_NODES, Frame, checked_depths, draw_current, draw_space, frame_of
+from .scene import MAX_NODES, draw_current, draw_space
+from .water import Frame, checked_depths, frame_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

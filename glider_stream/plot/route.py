@@ -10,7 +10,8 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..settings import require
 from .canvas import GREY, INK, Array, colours, frozen, new_figure, said_time, styled, time_unit
-from .water import Frame, checked_depths, draw_current, draw_ends, draw_space, frame_of, sample_field, stretch
+from .scene import draw_current, draw_ends, draw_space, stretch
+from .water import Frame, checked_depths, frame_of, sample_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,7 +14,8 @@ from ..kernels.control import CLIMB, DIVE
 from ..kernels.edges import Status
 from ..neighbours import AllNodes, as_csr
 from .canvas import GREY, INK, Array, colours, frozen, new_figure, styled, thinned, time_unit
-from .water import Frame, draw_current, frame_of
+from .scene import draw_current
+from .water import Frame, frame_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,0 +1,81 @@
+"""Fronts: how far one gets in so many hours, as lines of equal arrival time between a roadmap's nodes."""
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.terrain import Terrain
+from ..settings import require
+from .canvas import Array
+from .seabed import without_clearance
+from .water import Frame, sample_water
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST = 100
+"""More lines than this are a grey area."""
+STRETCHED = 3.0
+"""A triangle with a side so many times the median one spans water that nobody asked about."""
+HOUR = 3600.0
+FRONT = "#7a1f6b"
+
+
+class Fronts(NamedTuple):
+    """Places x, y (n,) [m], the earliest arrival there [s], at any depth, and triangles (m, 3) between them."""
+
+    x: Array
+    y: Array
+    time: Array
+    triangles: NDArray[np.intp]
+
+
+def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
+    """The places of nodes (n, 3) [m] that are reached, `arrival` (n,) [s], inf where one is not."""
+    from scipy.spatial import Delaunay, QhullError
+
+    known = np.isfinite(arrival)
+    places, which = np.unique(np.round(position[known, :2], 3), axis=0, return_inverse=True)
+    time = np.full(len(places), math.inf)
+    np.minimum.at(time, which.ravel(), arrival[known])
+    x, y = places[:, 0], places[:, 1]
+    triangles = np.empty((0, 3), np.intp)
+    if len(places) >= 3:
+        try:
+            triangles = Delaunay(places).simplices.astype(np.intp)
+        except QhullError:  # all on one line
+            return Fronts(x, y, time, triangles)
+        corners = places[triangles]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        middle = corners.mean(axis=1)
+        wet = sample_water(without_clearance(terrain), middle[:, 0], middle[:, 1], 0.0)
+        triangles = triangles[wet & (sides.max(axis=1) <= STRETCHED * np.median(sides))]
+    return Fronts(x, y, time, triangles)
+
+
+def front_times(fronts: Fronts, hours: float) -> Array:
+    """The times [s] of fronts every so many hours; InputError where that is no interval, or far too fine."""
+    require(0.0 < hours < math.inf, f"`fronts` must be a number of hours above 0; got {hours:g}")
+    last = float(fronts.time.max(initial=0.0)) / HOUR
+    count = math.floor(last / hours)
+    least = f"give {last / MOST:.2g} hours or more"
+    require(count <= MOST, f"`fronts` every {hours:g} hours are {count} lines until {last:.3g} hours; {least}")
+    return np.asarray(np.arange(1, count + 1) * (hours * HOUR), np.float64)
+
+
+def draw_fronts(ax: "Axes", frame: Frame, fronts: Fronts, hours: float) -> None:
+    """The fronts on a map, labelled in hours."""
+    levels = front_times(fronts, hours)
+    if not levels.size or not fronts.triangles.size:
+        return
+    from matplotlib.patheffects import withStroke
+    from matplotlib.tri import Triangulation
+
+    mesh = Triangulation(fronts.x / frame.unit, fronts.y / frame.unit, fronts.triangles)
+    lines: Any = ax.tricontour(
+        mesh, fronts.time / HOUR, levels=levels / HOUR, colors=FRONT, linewidths=0.9, zorder=3
+    )
+    for text in ax.clabel(lines, fmt=lambda level: f"{level:g} h", fontsize=7.5, inline=True):
+        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])

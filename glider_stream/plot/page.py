@@ -1,0 +1,198 @@
+"""A page: a route to look around in, one HTML file that asks nothing of any network.
+
+The files beside this one that make it: `page.html` is its body, `page.css` its look, and of its script
+`page-data.js` reads, `page-map.js` and `page-profile.js` draw, `page.js` moves. All that they draw stands in the
+page as one JSON text. The policy in `page.html` forbids the browser to load anything else.
+"""
+
+import html
+import json
+import math
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..flow import is_steady
+from ..kernels.flow import Flow
+from ..kernels.terrain import Terrain
+from ..settings import require
+from ..store import replacing
+from .along import along
+from .canvas import Array, length_unit, said_time, thinned, time_unit
+from .fronts import HOUR, Fronts, front_times
+from .route import map_depths
+from .seabed import known_until, sample_bottom
+from .water import Frame, frame_of, sample_field
+
+if TYPE_CHECKING:
+    from ..path import Path
+    from ..roadmap import Problem
+
+PAGE = ".html"
+SCRIPT = ("page-data.js", "page-map.js", "page-profile.js", "page.js")
+CURRENT_CELLS, SEABED_CELLS, LONLAT_POINTS = 56, 160, 33
+"""Along the longer side of the map; between the points of each the page reads linearly."""
+MOST_ROWS = 20_000
+"""Of the trajectory; a longer one is thinned, its ends kept."""
+FEWEST = 4  # rows of a leg
+
+
+def save_page(
+    file: str | File,
+    flow: Flow,
+    terrain: Terrain,
+    problem: "Problem",
+    position: Array,
+    path: "Path",
+    depths: Sequence[float] | None = None,
+    fronts: tuple[Fronts, float] | None = None,
+    title: str = "",
+) -> None:
+    """Write the page of a path that is `placed`; an old file is replaced by a whole one or not at all.
+
+    The current is shown at up to four `depths` [m], as `plot_route` chooses them among the nodes `position`
+    (n, 3) [m]; `fronts` with the hours between them. Of `problem` the box `lo`, `hi` [m], the `departure` [s]
+    and `to_lonlat` are read.
+    """
+    require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
+    rows = np.asarray(path.trajectory, np.float64)
+    frame = frame_of(problem, np.vstack([rows[:, 1:], path.legs[0].start, path.legs[-1].end]))
+    levels = map_depths(position, frame, depths)
+    held = {
+        **_words(flow, problem, path, title),
+        "box": [*frame.x, *frame.y],
+        "unit": dict(zip(("size", "name"), length_unit(frame.x, frame.y), strict=True)),
+        "lonlat": _lonlat(frame),
+        "current": _current(flow, frame, levels, problem.departure),
+        "seabed": _seabed(flow, terrain, frame),
+        "legs": _legs(flow, terrain, path),
+        "fronts": None if fronts is None else _fronts(*fronts),
+    }
+    text = page_text(held, held["title"])
+    with replacing(File(file)) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def page_text(held: dict[str, Any], title: str) -> str:
+    """The page that shows what is `held`."""
+
+    def part(name: str) -> str:
+        return files(__package__ or "").joinpath(name).read_text("utf-8")
+
+    # no text may end the script, or the document's beginning, that it stands in
+    data = json.dumps(held, separators=(",", ":"), allow_nan=False)
+    for mark in "<>&":
+        data = data.replace(mark, f"\\u{ord(mark):04x}")
+    script = "".join(map(part, SCRIPT))
+    pieces, rest = [], part("page.html")
+    for name, fill in (("title", html.escape(title)), ("css", part("page.css")), ("data", data), ("js", script)):
+        # what is filled in is not looked through again
+        piece, rest = rest.split(f"{{{{{name}}}}}")
+        pieces += [piece, fill]
+    return "".join([*pieces, rest])
+
+
+def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str, Any]:
+    unit, name = time_unit(path.travel_time)
+    when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+    legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
+    return {
+        "title": title or "Route",
+        "said": f"{legs}, {said_time(path.travel_time)}",
+        "when": when,
+        "time": {"size": unit, "name": name, "total": path.travel_time},
+        "departs": None if path.departs is None else path.departs.timestamp() * 1e3,
+    }
+
+
+def _numbers(values: Array, digits: int) -> list[Any]:
+    """Rounded numbers, None for those that are not finite: short, and JSON."""
+    rounded = np.round(values, digits) + 0.0
+    if digits <= 0:
+        return [int(value) if math.isfinite(value) else None for value in rounded.ravel().tolist()]
+    return [value if math.isfinite(value) else None for value in rounded.ravel().tolist()]
+
+
+def _lonlat(frame: Frame) -> dict[str, Any] | None:
+    if frame.to_lonlat is None:
+        return None
+    x, y = np.meshgrid(np.linspace(*frame.x, LONLAT_POINTS), np.linspace(*frame.y, LONLAT_POINTS))
+    lon, lat = frame.to_lonlat(np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])).T
+    return {"points": LONLAT_POINTS, "lon": _numbers(lon, 6), "lat": _numbers(lat, 6)}
+
+
+def _current(flow: Flow, frame: Frame, depths: Array, t: float) -> dict[str, Any]:
+    """The current in mm/s at cell centres, row by row from the south, for each depth."""
+    x, y = frame.mesh(CURRENT_CELLS)
+    fields = [sample_field(flow, x, y, -depth, t) for depth in depths]
+    fastest = max(float(np.nanmax(np.hypot(u, v), initial=0.0)) for u, v in fields)
+    return {
+        "cells": [x.shape[1], x.shape[0]],
+        "depths": _numbers(depths, 1),
+        "fastest": fastest,
+        "u": [_numbers(1e3 * u, 0) for u, _ in fields],
+        "v": [_numbers(1e3 * v, 0) for _, v in fields],
+    }
+
+
+def _seabed(flow: Flow, terrain: Terrain, frame: Frame) -> dict[str, Any] | None:
+    """Depth of the seabed at cell centres [m], 0 on land, None where it is not known; None if nowhere."""
+    x, y = frame.mesh(SEABED_CELLS)
+    depth = -sample_bottom(terrain, x, y, known_until(flow, terrain))
+    if not np.isfinite(depth).any():
+        return None
+    return {"cells": [x.shape[1], x.shape[0]], "depth": _numbers(depth, 0)}
+
+
+def _legs(flow: Flow, terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
+    most = max(FEWEST, MOST_ROWS // len(path.legs))
+    kept = [leg.trajectory[thinned(len(leg.trajectory), most)] for leg in path.legs]
+    rows = np.concatenate(kept)
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known_until(flow, terrain))
+    last = np.cumsum([len(some) for some in kept])
+    means = _means(path)
+    legs = []
+    for n, leg in enumerate(path.legs):
+        rows = kept[n]
+        over, u, v = means[n]
+        legs.append(
+            {
+                "t": _numbers(rows[:, 0], 1),
+                "x": _numbers(rows[:, 1], 1),
+                "y": _numbers(rows[:, 2], 1),
+                "depth": _numbers(-rows[:, 3], 1),
+                "seabed": _numbers(seabed[last[n] - len(rows) : last[n]], 0),
+                "depart": round(leg.depart, 1),
+                "duration": round(leg.duration, 1),
+                "glide": round(math.degrees(leg.glide_angle), 2),
+                "heading": round(leg.compass, 2),
+                "speed": round(leg.speed, 4),
+                "miss": round(leg.miss, 3),
+                "ground": _numbers(np.array([over]), 3)[0],
+                "current": _numbers(np.array([u, v]), 4),
+            }
+        )
+    return legs
+
+
+def _means(path: "Path") -> Array:
+    """Mean speed over ground and current u, v [m/s] of each leg, (legs, 3), NaN where one has no step."""
+    steps, count = along(path), len(path.legs)
+    sums = [np.bincount(steps.leg, weights=some, minlength=count) for some in (steps.speed, steps.u, steps.v)]
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.array(sums) / np.bincount(steps.leg, minlength=count)).T)
+
+
+def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:
+    front_times(fronts, hours)  # refuses what cannot be drawn
+    return {
+        "hours": hours,
+        "last": float(fronts.time.max(initial=0.0)) / HOUR,
+        "x": _numbers(fronts.x, 0),
+        "y": _numbers(fronts.y, 0),
+        "time": _numbers(fronts.time, 0),
+        "triangles": fronts.triangles.ravel().tolist(),
+    }

@@ -1,0 +1,126 @@
+"""What figures are made of: the current and the land on a map, the ends of a route, the box in space."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..kernels.flow import Flow
+from ..kernels.terrain import Terrain
+from .canvas import GREY, INK, Array, colours, thinned
+from .graticule import draw_graticule
+from .seabed import without_clearance
+from .water import Frame, sample_field, sample_water
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PIXELS = 240  # along the longer side of a map
+MAX_NODES = 4000
+HEIGHT = 0.55  # of a box in space, to its longer side
+LAND, SEABED = "#8c8c8c", "#cfcfcf"
+COASTLINE = 1.2  # points
+
+
+def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:
+    """Land in dark grey, what is too shallow at a depth [m] in light grey, the coast; whether there is any."""
+    from matplotlib.colors import ListedColormap
+
+    x, y = frame.mesh(PIXELS)
+    dry = (~sample_water(terrain, x, y, -depth)).astype(np.float64)
+    land = ~sample_water(without_clearance(terrain), x, y, 0.0)
+    dry += land
+    ends = [side / frame.unit for side in (*frame.x, *frame.y)]
+    grey = ListedColormap(["white", SEABED, LAND])
+    ax.imshow(dry, cmap=grey, vmin=0, vmax=2, origin="lower", extent=(ends[0], ends[1], ends[2], ends[3]))
+    if not dry.any():
+        return False
+    # in print, dark water and land are the same grey: only an outline tells them apart
+    for outlined, width in ((dry > 0, 0.5), (land, COASTLINE)):
+        if outlined.any() and not outlined.all():
+            ax.contour(
+                x / frame.unit, y / frame.unit, outlined, levels=[0.5], colors=INK, linewidths=width, zorder=2.5
+            )
+    return True
+
+
+def draw_current(
+    ax: "Axes",
+    flow: Flow,
+    terrain: Terrain,
+    frame: Frame,
+    depth: float,
+    t: float,
+    pale: float = 0.15,
+    arrows: int = 15,
+) -> Any:
+    """The current at a depth [m] and time t [s]: speed as colour, direction as arrows; returns the image.
+
+    `pale` is the share of white in the colours, `arrows` their number along the longer side.
+    """
+
+    def current(count: int) -> tuple[Array, Array, Array, Array]:
+        x, y = frame.mesh(count)
+        u, v = sample_field(flow, x, y, -depth, t)
+        wet = sample_water(terrain, x, y, -depth)
+        return x / frame.unit, y / frame.unit, np.where(wet, u, np.nan), np.where(wet, v, np.nan)
+
+    draw_land(ax, terrain, frame, depth)
+    _, _, u, v = current(PIXELS)
+    ends = [side / frame.unit for side in (*frame.x, *frame.y)]
+    colour = colours("cmo.speed", 0.0, 0.8, pale)
+    extent = (ends[0], ends[1], ends[2], ends[3])
+    image = ax.imshow(np.hypot(u, v), cmap=colour, vmin=0.0, origin="lower", extent=extent)
+    x, y, u, v = current(arrows)
+    speed = np.hypot(u, v)
+    # lengths by the square root: slow water stays readable next to fast
+    length = 1.0 / np.sqrt(np.maximum(speed * np.nanmax(speed, initial=1e-12), 1e-12))
+    look: dict[str, Any] = {
+        "scale_units": "width",
+        "scale": arrows * 1.15,
+        "width": 0.07 / arrows,
+        "pivot": "mid",
+    }
+    ax.quiver(x, y, u * length, v * length, angles="xy", color=INK, alpha=0.55, **look)
+    ax.set(xlim=ends[:2], ylim=ends[2:], aspect="equal")
+    ax.locator_params(nbins=5, steps=[1, 2, 5, 10])
+    draw_graticule(ax, frame)
+    return image
+
+
+def draw_ends(ax: Any, points: Array, size: float = 1.0) -> None:
+    """Start and goal, told apart by shape: colour alone is lost in print."""
+    for row, marker, area, label in ((0, "o", 70, "start"), (-1, "*", 190, "goal")):
+        place = [points[row, k : k + 1] for k in range(points.shape[1])]
+        look = {"edgecolors": INK, "facecolors": "white", "linewidths": 1.4, "zorder": 9, "clip_on": False}
+        ax.scatter(*place, marker=marker, s=area * size, label=label, **look)
+
+
+def draw_space(ax: Any, terrain: Terrain, frame: Frame, nodes: Array, ticks: int = 5, **look: Any) -> Any:
+    """Dress a 3-D panel, depth downward, with its nodes (n, 3) [m]; returns their marks."""
+    sides = np.array([frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]])
+    ax.computed_zorder = False
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=28, azim=-58)
+    ax.set_box_aspect((*sides / sides.max(), HEIGHT), zoom=1.05)
+    ends = [side / frame.unit for side in (*frame.x, *frame.y)]
+    ax.set(xlim=ends[:2], ylim=ends[2:], zlim=(frame.bottom, frame.top))
+    ax.set(xlabel=f"East ({frame.name})", ylabel=f"North ({frame.name})", zlabel="Depth (m)")
+    ax.locator_params(nbins=ticks)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.pane.set(facecolor="white", edgecolor="#bbbbbb")
+        axis._axinfo["grid"].update(color="#e6e6e6", linewidth=0.5)
+    x, y = frame.mesh(PIXELS // 2)
+    dry = ~sample_water(terrain, x, y, -frame.top)
+    if dry.any():
+        x, y = x / frame.unit, y / frame.unit
+        ax.contourf(x, y, dry, levels=[0.5, 1.5], colors=LAND, offset=frame.top, alpha=0.6, zorder=1)
+    drawn = frame.scaled(nodes[thinned(len(nodes), MAX_NODES)])
+    faint = {"s": 5, "color": GREY, "alpha": 0.7, "linewidths": 0, "zorder": 2}
+    return ax.scatter(*drawn.T, **(faint | look))
+
+
+def stretch(frame: Frame) -> str:
+    """How many times depth is stretched in `draw_space`, in words."""
+    times = HEIGHT * max(frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]) / (frame.bottom - frame.top)
+    said = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    return f"depth stretched {said} times" if times > 1.05 else "depth to scale"
