@@ -1,290 +1,180 @@
-"""Calibration: the drag, or the buoyancy, of a vehicle from dives that it flew."""
+"""Calibration: the buoyancy, drag and lift of a vehicle, as far as dives that it flew determine them.
 
-import csv
-import io
+Where each dive tells two numbers, speed and glide angle, all forces may be multiplied by one number and nothing
+recorded changes: of net mass and drag only the ratio shows, and of lift and induced drag only c / a^2. What does
+not show is held at the preset's value, and said.
+"""
+
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .calibration import CONFIDENCE, Calibration, Parameter, scatter
+from .dives import Dives
 from .errors import InputError
-from .glider import PRESETS, Glider, Seaglider, SteadyGlide
+from .fit import FURTHEST_MAIN, Fit, Problem
+from .flown import per_volume, vehicle
+from .glider import PRESETS, Glider, Seaglider, SteadyGlide, polar
 from .settings import require
-from .toml import to_toml
 
 Array = NDArray[np.float64]
 
-COLUMNS = {
-    "vertical": ("vertical_speed", "vertical_speed_mps", "mean_abs_vert_speed_mps", "vert_speed", "w", "w_mps"),
-    "horizontal": ("horizontal_speed", "horizontal_speed_mps", "mean_horz_speed_mps", "horz_speed", "u", "u_mps"),
-    "pitch": ("pitch", "pitch_deg", "mean_pitch", "mean_pitch_deg"),
-    "glide_angle": ("glide_angle", "glide_angle_deg", "gamma", "gamma_deg"),
-    "buoyancy": ("buoyancy", "buoyancy_cc", "vbd_cc", "net_volume_cc"),
+VEHICLES = ("seaglider", "slocum")
+KEYS: dict[type[Glider], tuple[str, str, str]] = {
+    Seaglider: ("drag", "induced_drag", "lift"),
+    SteadyGlide: ("drag_0", "drag_alpha2", "lift_alpha"),
 }
-"""What a column may be called: speeds through water [m/s], angles [degrees], buoyancy off neutral [cc]."""
-MOST_TEXT, MOST_DIVES = 20_000_000, 20_000
-CONFIDENCE = 0.99
-"""The share of dives that the uncertainty shown is to hold."""
-STEEP = (80.0, 85.0)
-"""Any vehicle glides as steeply: a range of angles that no fit can leave."""
-SCALE = "drag_0"
-
-
-@dataclass(frozen=True)
-class Dives:
-    """What was recorded (n,): vertical and horizontal speed [m/s], glide angle and pitch [rad], buoyancy [cc].
-
-    NaN where there is none; all as magnitudes. `took`: which column was taken for what.
-    """
-
-    vertical: Array
-    horizontal: Array
-    glide_angle: Array
-    pitch: Array
-    buoyancy: Array
-    took: dict[str, str]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A fitted value, its standard error, and the preset's."""
-
-    value: float
-    error: float
-    before: float
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """A fitted `glider`; `parameters` by name; what was `held`; residuals (n,) [m/s] and what they may be.
-
-    `vertical_within`, `horizontal_within` [m/s]: within these of the model a further dive lies, CONFIDENCE of
-    them.
-    """
-
-    glider: Glider
-    parameters: dict[str, Parameter]
-    held: str
-    dives: Dives
-    vertical_off: Array
-    horizontal_off: Array
-    vertical_within: float
-    horizontal_within: float
-
-    def table(self) -> str:
-        """The [glider] section of a scenario."""
-        kinds = {SteadyGlide: "steady-glide", Seaglider: "seaglider"}
-        values = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self.glider).items()}
-        return to_toml({"glider": {"model": kinds[type(self.glider)], **values}})
-
-    def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
-        return {
-            "dives": int(self.dives.vertical.size),
-            "took": self.dives.took,
-            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
-            "held": self.held,
-            "vertical_scatter_mps": _scatter(self.vertical_off, len(self.parameters)),
-            "horizontal_scatter_mps": _scatter(self.horizontal_off, len(self.parameters)),
-            "vertical_within_mps": self.vertical_within,
-            "horizontal_within_mps": self.horizontal_within,
-            "confidence": CONFIDENCE,
-            "glider": {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self.glider).items()},
-        }
-
-    def __str__(self) -> str:
-        columns = ", ".join(f"{name} of column {column}" for name, column in self.dives.took.items())
-        lines = [f"{self.dives.vertical.size} dives: {columns}"]
-        for name, one in self.parameters.items():
-            lines.append(f"  {name:<12} {one.value:.5g} +- {one.error:.2g} (the preset has {one.before:.5g})")
-        lines.append(f"  held         {self.held}")
-        for name, off, within in (
-            ("vertical", self.vertical_off, self.vertical_within),
-            ("horizontal", self.horizontal_off, self.horizontal_within),
-        ):
-            scatter = _scatter(off, len(self.parameters))
-            lines.append(
-                f"  {name:<12} off by {scatter:.4f} m/s (one standard deviation), "
-                f"{CONFIDENCE:.0%} of dives within {within:.4f} m/s; the worst {np.abs(off).max():.4f} m/s"
-            )
-        return "\n".join([*lines, f"  {self.glider}"])
-
-
-def _scatter(off: Array, fitted: int) -> float:
-    return float(np.sqrt((off**2).sum() / max(off.size - fitted, 1)))
-
-
-def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Dives:
-    """Dives out of a CSV file with a header; `columns` names those that are called otherwise.
-
-    InputError where it lacks what a fit needs, or a value is none; the row is named.
-    """
-    path = Path(file)
-    require(path.is_file(), f"the file of dives {path} does not exist")
-    size = path.stat().st_size
-    require(size <= MOST_TEXT, f"{path.name} holds {size:,} bytes, more than {MOST_TEXT:,}; cut it")
-    try:
-        rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"))))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path.name} cannot be read as CSV: {error}; save it as such") from None
-    require(
-        0 < len(rows) <= MOST_DIVES, f"{path.name} must hold from 1 to {MOST_DIVES:,} dives; got {len(rows):,}"
-    )
-    header = [name for name in rows[0] if name is not None]
-    said = dict(columns or {})
-    for name in said:
-        require(name in COLUMNS, f"`{name}` is no column that is known; choose from: {', '.join(COLUMNS)}")
-    found: dict[str, str] = {}
-    for name, usual in COLUMNS.items():
-        here = [column for column in header if column.strip().lower() in usual]
-        column = said.get(name, here[0] if here else None)
-        if column is not None:
-            require(column in header, f"{path.name} has no column `{column}`; it has: {', '.join(header)}")
-            found[name] = column
-    require(
-        "vertical" in found, f"{path.name} has no column of vertical speeds; name it, out of: {', '.join(header)}"
-    )
-    angled = {"horizontal", "pitch", "glide_angle"} & set(found)
-    require(
-        bool(angled), f"{path.name} has neither horizontal speed nor pitch nor glide angle: {', '.join(header)}"
-    )
-    values = {name: _numbers(path.name, rows, column) for name, column in found.items()}
-    none = np.full(len(rows), np.nan)
-    vertical, horizontal = values["vertical"], values.get("horizontal", none)
-    angle = np.radians(values["glide_angle"]) if "glide_angle" in values else np.arctan2(vertical, horizontal)
-    pitch = np.radians(values["pitch"]) if "pitch" in values else none
-    return Dives(vertical, horizontal, angle, pitch, values.get("buoyancy", none), found)
-
-
-def _numbers(name: str, rows: Sequence[Mapping[str, str]], column: str) -> Array:
-    values = []
-    for n, row in enumerate(rows, 2):
-        try:
-            value = abs(float(row[column]))
-        except (TypeError, ValueError):
-            value = math.nan
-        require(
-            math.isfinite(value) and value < 1e6, f"line {n} of {name}: {column} = {row[column]!r} is no number"
-        )
-        require(value > 0, f"line {n} of {name}: {column} is 0, which no dive has; leave that dive out")
-        values.append(value)
-    return np.array(values)
-
-
-def _with(base: Glider, values: Mapping[str, Any], volume: float) -> Glider:
-    """The base glider with other coefficients, a volume [cc] off neutral in either phase."""
-    if isinstance(base, Seaglider):
-        return replace(base, **values, dive_volume=volume, climb_volume=volume, angles=STEEP)
-    assert isinstance(base, SteadyGlide)
-    mass = volume * 1e-6 * DENSITY
-    return replace(base, **values, offset=mass, ballast_max=2 * mass, angles=STEEP)
-
-
-DENSITY = 1025.0
-"""Of sea water [kg/m^3], to make a mass of a volume."""
-
-
-def _own_volume(base: Glider) -> float:
-    """How far off neutral the preset is [cc]."""
-    if isinstance(base, Seaglider):
-        return base.dive_volume
-    assert isinstance(base, SteadyGlide)
-    return base.offset / DENSITY * 1e6
-
-
-def _predicted(base: Glider, values: Mapping[str, float], volumes: Array, dives: Dives) -> tuple[Array, Array]:
-    """Vertical and horizontal speed [m/s] of each dive, at its glide angle, or at that of its pitch."""
-    vertical, horizontal = np.empty_like(volumes), np.empty_like(volumes)
-    for volume in np.unique(volumes):
-        here = volumes == volume
-        glider = _with(base, values, float(volume))
-        angle = dives.glide_angle[here]
-        if np.isnan(angle).any():
-            angle = _of_pitch(glider, dives.pitch[here])
-        speed = np.nan_to_num(glider.speed(-angle))
-        vertical[here], horizontal[here] = speed * np.sin(angle), speed * np.cos(angle)
-    return vertical, horizontal
-
-
-def _of_pitch(glider: Glider, pitch: Array) -> Array:
-    """Glide angles [rad] whose pitch, gamma + alpha, is as steep as given: a table, read backward.
-
-    Near the limit of a steady glide alpha grows, and the pitch with it: the steeper of the two is flown.
-    """
-    low = float(np.abs(glider.feasible_limits()).max()) + 1e-6
-    angle = np.linspace(low, math.radians(89.0), 4000)
-    nose = np.abs(-angle + glider.angle_of_attack(-angle))
-    flattest = int(nose.argmin())
-    return np.interp(pitch, nose[flattest:], angle[flattest:])
+"""By model: the keys of parasite drag, induced drag and lift."""
+INSTRUMENTS = ("vertical", "horizontal", "glide_angle", "pitch")
+DETERMINED = 0.25
+"""A relative standard error beyond it is no determination: the coefficient is held instead."""
+OUTLYING = 3.0
+"""Scatters away from the fit that make a dive worth a look."""
+FLAT = 0.1
+"""The share of dives that may be too flat for a vehicle by the scatter of their angles."""
+FEWEST = 3
 
 
 def calibrate(dives: Dives, preset: str = "seaglider") -> Calibration:
-    """Fit a preset to dives by least squares of their vertical (and horizontal) speeds.
+    """Fit a preset to dives by least squares of their distance from what the vehicle's instruments would record.
 
-    With the buoyancy of each dive the parasite drag is fitted; without, only its ratio to the buoyancy can
-    be, and the buoyancy is, the drag held. Standard errors come from the Jacobian and the scatter.
+    With the buoyancy of each dive the parasite drag is fitted; without, the buoyancy is, of each phase where
+    phases are told. The lift needs a pitch beside the glide angle. It and the induced drag are held where the
+    dives do not determine them. Standard errors come from the Jacobian and the scatter of the residuals.
     """
-    from scipy.optimize import least_squares
-    from scipy.stats import t as student
+    require(preset in VEHICLES, f"`preset` = {preset!r} cannot be calibrated; choose from: {', '.join(VEHICLES)}")
+    base, count = PRESETS[preset], dives.vertical.size
+    require(count >= FEWEST, f"a calibration needs {FEWEST} dives or more; got {count}: add some")
+    drag, induced, lift = KEYS[type(base)]
+    problem = _problem(dives, base)
+    main = tuple(problem.groups) or (drag,)
+    angled = dives.horizontal is not None or dives.glide_angle is not None
+    held, loose = _held(drag, base), []
+    if problem.recorded is not None:
+        held.pop(drag)
+    if angled:
+        loose.append(induced)
+    else:
+        held[induced] = "a pitch alone does not tell it from the lift"
+    if angled and dives.pitch is not None:
+        loose.append(lift)
+    else:
+        held[lift] = f"without a pitch beside the glide angle only {induced} / {lift}^2 shows"
+    first = problem.fit(main, {})
+    start = dict(zip(main, first.logs, strict=True))
+    while True:
+        room = count * (len(problem.kinds) - 1) - 1
+        if len(main) + len(loose) > room:
+            held[loose.pop()] = "there are too few dives"
+            continue
+        fit = problem.fit((*main, *loose), start) if loose else first
+        vague = _vague(problem, fit, first)
+        if vague is None:
+            break
+        loose.remove(vague[0])
+        held[vague[0]] = vague[1]
+    for n, name in enumerate(main):
+        wrong = f"no {name} within a factor of {math.exp(FURTHEST_MAIN):.0f} of the preset's fits"
+        require(not fit.bound[n], f"{wrong} {', '.join(dives.took.values())}; look at their units")
+    return _calibration(problem, preset, fit, held)
 
-    known = preset in ("seaglider", "slocum")
-    require(known, f"`preset` = {preset!r} cannot be calibrated; choose from: seaglider, slocum")
-    base = PRESETS[preset]
-    drag = "drag" if isinstance(base, Seaglider) else SCALE
-    by_buoyancy = bool(np.isfinite(dives.buoyancy).all())
-    name = drag if by_buoyancy else "buoyancy"
-    before = float(getattr(base, drag)) if by_buoyancy else _own_volume(base)
-    need = 3
-    count = dives.vertical.size
-    require(count >= need, f"a calibration needs {need} dives or more; got {count}")
-    across = bool(np.isfinite(dives.horizontal).all())
 
-    def predicted(ratio: float) -> tuple[Array, Array]:
-        values = {drag: before * ratio} if by_buoyancy else {}
-        volumes = dives.buoyancy if by_buoyancy else np.full(count, before * ratio)
-        return _predicted(base, values, volumes, dives)
+def _vague(problem: Problem, fit: Fit, first: Fit) -> tuple[str, str] | None:
+    """The coefficient that the dives determine worst, and why it does not do; `first`: the fit without any."""
+    loose = [n for n in range(len(fit.names)) if fit.names[n] not in first.names]
+    if not loose:
+        return None
+    worst = max(loose, key=lambda n: (bool(fit.bound[n]), float(fit.errors[n])))
+    name, error = fit.names[worst], float(fit.errors[worst])
+    flat = [np.mean(problem.flat(one)) for one in (fit, first)]
+    if fit.bound[worst]:
+        return name, "these dives fit best with one that no vehicle has, so they do not determine it"
+    if flat[0] > flat[1] + FLAT:
+        return name, "these dives fit best with one that could not have flown some of them"
+    if not error <= DETERMINED:
+        return name, f"these dives determine it to {min(error, 99.0):.0%} only"
+    return None
 
-    def residuals(log_ratio: Array) -> Array:
-        vertical, horizontal = predicted(math.exp(float(log_ratio[0])))
-        parts = [vertical - dives.vertical, *([horizontal - dives.horizontal] if across else [])]
-        return np.concatenate(parts)
 
-    fit = least_squares(residuals, np.zeros(1), bounds=(-4.0, 4.0), x_scale=0.1)
-    ratio = math.exp(float(fit.x[0]))
-    require(
-        abs(float(fit.x[0])) < 3.99, f"no {name} within a factor of 50 of the preset's fits; look at the units"
-    )
-    vertical, horizontal = predicted(ratio)
-    off_vertical = vertical - dives.vertical
-    off_horizontal = horizontal - dives.horizontal if across else np.zeros(count)
-    variance = float((fit.fun**2).sum()) / max(count - 1, 1)
-    slope = float((np.asarray(fit.jac) ** 2).sum())
-    error = math.sqrt(variance / slope) * before * ratio if slope > 0 else math.inf
-    wide = float(student.ppf(0.5 + CONFIDENCE / 2, count - 1)) * math.sqrt(1 + 1 / count)
-    volume = float(np.mean(dives.buoyancy)) if by_buoyancy else before * ratio
-    fitted = _with(base, {drag: before * ratio} if by_buoyancy else {}, volume)
-    lowest = math.degrees(float(np.abs(fitted.feasible_limits()).max()))
-    low = max(base.angles[0], math.ceil(lowest + 0.5))
-    held = f"the induced drag and the lift of {preset}"
-    if not by_buoyancy:
-        held = f"all drag and lift of {preset}: speeds and angles tell only the ratio of buoyancy to drag"
-    glider = replace(
-        fitted,
-        angles=(low, base.angles[1]),
-        name=f"{preset}, calibrated",
-        note=f"{name} fitted to {count} dives: {before * ratio:.5g} +- {error:.2g}; held: {held}",
-    )
+def _held(drag: str, base: Glider) -> dict[str, str]:
+    """What is held whatever the dives are, and why."""
+    shape = "drag_exponent" if isinstance(base, Seaglider) else "lift_0"
+    why = "the published model's shape" if isinstance(base, Seaglider) else "the vehicle is symmetrical"
+    return {drag: "without a recorded buoyancy only its ratio to the buoyancy shows", shape: why}
+
+
+def _problem(dives: Dives, base: Glider) -> Problem:
+    unit = per_volume(base)
+    own = base.dive_volume if isinstance(base, Seaglider) else float(base.net_mass(-1.0)) / unit
+    kinds = tuple(kind for kind in INSTRUMENTS if getattr(dives, kind) is not None)
+    if dives.buoyancy is not None:
+        return Problem(dives, base, own, kinds, {}, dives.buoyancy / (unit if dives.unit == "kg" else 1.0))
+    groups = {"buoyancy": np.full(dives.vertical.size, True)}
+    if dives.down is not None and min(dives.down.sum(), (~dives.down).sum()) > 1:
+        groups = {"dive_buoyancy": dives.down, "climb_buoyancy": ~dives.down}
+    return Problem(dives, base, own, kinds, groups, None)
+
+
+def _calibration(problem: Problem, preset: str, fit: Fit, held: dict[str, str]) -> Calibration:
+    """The vehicle that a fit found, and how far the dives are from it at the angles that they were flown at."""
+    from scipy.special import stdtrit
+
+    dives, base, count, fitted = problem.dives, problem.base, problem.dives.vertical.size, len(fit.names)
+    ratio = dict(zip(fit.names, np.exp(fit.logs), strict=True))
+    parameters = {}
+    for name, error in zip(fit.names, fit.errors, strict=True):
+        before = problem.own if name in problem.groups else float(getattr(base, name))
+        value = before * float(ratio[name])
+        parameters[name] = Parameter(value, value * float(error), before, "cc" if name in problem.groups else "")
+    flown = problem.flown(fit.names, fit.logs)
+    angle = flown.angle(dives)
+    vertical = flown.speed(angle) * np.sin(angle) - dives.vertical
+    horizontal = None
+    if dives.horizontal is not None:
+        horizontal = flown.speed(angle) * np.cos(angle) - dives.horizontal
+    elif dives.glide_angle is not None:
+        # the horizontal speed that vertical speed and glide angle tell
+        horizontal = vertical / np.tan(angle)
+    wide = float(stdtrit(max(count - fitted, 1), 0.5 + CONFIDENCE / 2)) * math.sqrt(1 + fitted / count)
+    off = np.abs(vertical if horizontal is None else np.hypot(vertical, horizontal))
+    outlying = dives.line[off > OUTLYING * scatter(off, fitted)]
+    said = [f"{name} {one.value:.5g} +- {one.error:.2g} {one.unit}".rstrip() for name, one in parameters.items()]
+    note = f"fitted to {count} dives: {', '.join(said)}; held: {', '.join(held)}"
+    volumes = _volumes(dives, flown.volumes)
+    glider = vehicle(base, problem.values(ratio), *volumes, name=f"{preset}, calibrated", note=note)
     return Calibration(
-        glider=glider,
-        parameters={name: Parameter(before * ratio, error, before)},
+        glider=_ranged(glider, base, np.degrees(angle)),
+        parameters=parameters,
         held=held,
         dives=dives,
-        vertical_off=off_vertical,
-        horizontal_off=off_horizontal,
-        vertical_within=wide * _scatter(off_vertical, 1),
-        horizontal_within=wide * _scatter(off_horizontal, 1),
+        vertical_off=vertical,
+        horizontal_off=horizontal,
+        flat=tuple(int(n) for n in dives.line[problem.flat(fit)]),
+        vertical_within=wide * scatter(vertical, fitted),
+        horizontal_within=None if horizontal is None else wide * scatter(horizontal, fitted),
+        outlying=tuple(int(n) for n in outlying),
     )
+
+
+def _volumes(dives: Dives, volumes: Array) -> tuple[float, float]:
+    """The mean off neutral in a dive and in a climb [cc]; the other's where one of them is not flown."""
+    phases = [volumes] * 2 if dives.down is None else [volumes[dives.down], volumes[~dives.down]]
+    dive, climb = (float((one if one.size else volumes).mean()) for one in phases)
+    return dive, climb
+
+
+def _ranged(glider: Glider, base: Glider, angle: Array) -> Glider:
+    """The glider over the preset's range and the flown angles [degrees], as far as the kernels can take them."""
+    limit = math.degrees(max(map(abs, glider.limits)))
+    high = max(base.angles[1], math.ceil(float(angle.max())))
+    low = max(min(base.angles[0], math.floor(float(angle.min()))), math.ceil(limit + 0.5))
+    while True:
+        ranged = replace(glider, angles=(float(low), float(min(high, 89.0))))
+        try:
+            polar(ranged)
+            return ranged
+        except InputError:
+            # near its limit a vehicle may sink faster on a flatter path
+            low += 1

@@ -270,14 +270,14 @@ def score(roadmap: Path, route: Path, as_json: bool) -> None:
     multiple=True,
     type=key_and_value,
     metavar="WHAT=COLUMN",
-    help="vertical, horizontal, pitch, glide_angle or buoyancy, where the file calls it otherwise.",
+    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase, called otherwise.",
 )
 @click.option("-o", "--output", type=FILE, help="A TOML file for the [glider] section to write.")
 @JSON
 def calibrate(
     dives: Path, preset: str, columns: tuple[tuple[str, Any], ...], output: Path | None, as_json: bool
 ) -> None:
-    """Fit the drag of a vehicle, or its buoyancy, to DIVES: a CSV file of what it flew."""
+    """Fit buoyancy or drag of a vehicle, and its lift, to DIVES: a CSV file of what it flew."""
     from . import planner
 
     found = planner.calibrate(dives, output, preset=preset, columns={name: str(own) for name, own in columns})

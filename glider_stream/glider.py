@@ -9,6 +9,7 @@ import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class Glider:
 
     def __post_init__(self) -> None:
         low, high = self.angles
-        for phase, limit in zip(("dive", "climb"), np.degrees(np.abs(self.feasible_limits())), strict=True):
+        for phase, limit in zip(("dive", "climb"), np.degrees(np.abs(self.limits)), strict=True):
             require(
                 limit < low < high < 90.0,
                 f"`glider.angles` must rise from above {limit:.4f} degrees, the limit of a steady {phase}, "
@@ -78,6 +79,11 @@ class Glider:
         """Net mass m0 [kg] of the phase: > 0 in a dive, < 0 in a climb."""
         return np.where(np.asarray(gamma) < 0.0, *self._net_masses())
 
+    @cached_property
+    def limits(self) -> tuple[float, float]:
+        """`feasible_limits`, found once: a fit asks for them some thousand times."""
+        return self.feasible_limits()
+
     def feasible_limits(self) -> tuple[float, float]:
         """The limits [rad]: gamma below the first dives, above the second climbs; between is no glide."""
         raise NotImplementedError
@@ -93,7 +99,7 @@ class Glider:
     def _feasible(self, gamma: Array | float) -> Array:
         """The angles [rad], NaN for those that no steady glide has."""
         gamma = np.asarray(gamma, dtype=np.float64)
-        dive, climb = self.feasible_limits()
+        dive, climb = self.limits
         glides = ((gamma < dive) | (gamma > climb)) & (np.abs(gamma) <= 0.5 * math.pi)
         return np.where(glides, gamma, np.nan)
 

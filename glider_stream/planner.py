@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .bench import Record
-    from .calibrate import Calibration
+    from .calibration import Calibration
     from .describe import Description, Place
     from .ocean import Names
     from .suite import Report
@@ -364,7 +364,8 @@ def calibrate(
     columns: Mapping[str, str] | None = None,
 ) -> "Calibration":
     """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says."""
-    from .calibrate import calibrate, read_dives
+    from .calibrate import calibrate
+    from .dives import read_dives
 
     if output is not None:
         check_output(output)

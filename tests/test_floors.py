@@ -17,7 +17,7 @@ FLOORS = {
     " kernels.refine"
     " errors settings toml threads hdf5",
     4: "cost bins glider flow domain frame ocean terrain brute_force",
-    5: "calibrate sampling neighbours edges legs",
+    5: "dives flown fit calibration calibrate sampling neighbours edges legs",
     6: "roadmap path waypoints windows drawn difference",
     7: "lock store journal query change",
     8: "slocum seaglider export plot progress describe verify cluster jobs baselines"

@@ -1,0 +1,117 @@
+"""A calibration: the vehicle that dives were fitted by, and how sure one may be of it."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dives import Dives
+from .glider import MODELS, Glider
+from .toml import to_toml
+
+Array = NDArray[np.float64]
+
+CONFIDENCE = 0.99
+"""The share of further dives that the uncertainty shown is to hold."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A fitted value with its `unit`, its standard error, and the preset's."""
+
+    value: float
+    error: float
+    before: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A fitted `glider`; `parameters` by name; what was `held`, and why.
+
+    Errors (n,) [m/s] of the fitted vehicle's speeds at each dive's recorded angle: `vertical_off`, and
+    `horizontal_off` where the horizontal speed is told; within `vertical_within`, `horizontal_within` [m/s] of
+    the vehicle a further dive lies, CONFIDENCE of them. `outlying`: lines of dives that are far off;
+    `flat`: of those flatter than the vehicle can glide.
+    """
+
+    glider: Glider
+    parameters: dict[str, Parameter]
+    held: dict[str, str]
+    dives: Dives
+    vertical_off: Array
+    horizontal_off: Array | None
+    vertical_within: float
+    horizontal_within: float | None
+    outlying: tuple[int, ...]
+    flat: tuple[int, ...]
+
+    def table(self) -> str:
+        """The [glider] section of a scenario."""
+        kinds = {kind: name for name, kind in MODELS.items()}
+        return to_toml({"glider": {"model": kinds[type(self.glider)], **_values(self.glider)}})
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        across = self.horizontal_off
+        return {
+            "dives": int(self.dives.vertical.size),
+            "took": self.dives.took,
+            "unused": list(self.dives.unused),
+            "loss": "least squares, plain",
+            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
+            "held": self.held,
+            "vertical_scatter_mps": scatter(self.vertical_off, len(self.parameters)),
+            "horizontal_scatter_mps": None if across is None else scatter(across, len(self.parameters)),
+            "vertical_within_mps": self.vertical_within,
+            "horizontal_within_mps": self.horizontal_within,
+            "confidence": CONFIDENCE,
+            "outlying_lines": list(self.outlying),
+            "flat_lines": list(self.flat),
+            "glider": _values(self.glider),
+        }
+
+    def __str__(self) -> str:
+        took = ", ".join(f"{what} = {column}" for what, column in self.dives.took.items())
+        phases = "" if self.dives.down is not None else "; phases are not told, so a climb mirrors a dive"
+        lines = [f"{self.dives.vertical.size} dives, {took}{phases}"]
+        if self.dives.unused:
+            lines.append(_line("not used", ", ".join(self.dives.unused)))
+        lines.append(_line("fit", "plain least squares; +- is one standard error, what is held taken for right"))
+        for name, one in self.parameters.items():
+            value = f"{one.value:.5g} +- {one.error:.2g} {one.unit}".rstrip()
+            lines.append(_line(name, f"{value} (the preset has {one.before:.5g})"))
+        lines += [_line(name, f"held: {why}") for name, why in self.held.items()]
+        for name, off, within in (
+            ("vertical", self.vertical_off, self.vertical_within),
+            ("horizontal", self.horizontal_off, self.horizontal_within),
+        ):
+            if off is not None:
+                spread, worst = scatter(off, len(self.parameters)), float(np.abs(off).max())
+                share = f"{CONFIDENCE:.0%} of further dives within {within:.4f} m/s of the vehicle"
+                lines.append(
+                    _line(name, f"scatters by {spread:.4f} m/s; {share}; the worst here {worst:.4f} m/s")
+                )
+        if self.dives.horizontal is not None:
+            lines.append(_line("beware", "a horizontal speed that a flight model made gives that model back"))
+        if self.outlying:
+            far = ", ".join(map(str, self.outlying))
+            lines.append(_line("far off", f"line {far}: look at these dives, or leave them out"))
+        if self.flat:
+            far = ", ".join(map(str, self.flat))
+            lines.append(_line("too flat", f"line {far}: the vehicle cannot glide so; try another preset"))
+        return "\n".join([*lines, f"  {self.glider}"])
+
+
+def _line(name: str, said: str) -> str:
+    return f"  {name:<14} {said}"
+
+
+def _values(glider: Glider) -> dict[str, Any]:
+    return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(glider).items()}
+
+
+def scatter(off: Array, fitted: int) -> float:
+    """The standard deviation of errors (n,), some parameters fitted."""
+    return float(np.sqrt((off**2).sum() / max(off.size - fitted, 1)))

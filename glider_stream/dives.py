@@ -1,0 +1,197 @@
+"""Recorded dives, out of a CSV file."""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .settings import require
+
+Array = NDArray[np.float64]
+
+COLUMNS = {
+    "vertical": ("vertical_speed", "vertical_speed_mps", "mean_abs_vert_speed_mps", "vert_speed", "w", "w_mps"),
+    "horizontal": ("horizontal_speed", "horizontal_speed_mps", "mean_horz_speed_mps", "horz_speed", "u", "u_mps"),
+    "pitch": ("pitch", "pitch_deg", "mean_pitch", "mean_pitch_deg"),
+    "glide_angle": ("glide_angle", "glide_angle_deg", "gamma", "gamma_deg"),
+    "buoyancy": ("buoyancy", "buoyancy_cc", "vbd_cc", "net_volume_cc"),
+    "net_mass": ("net_mass", "net_mass_kg", "buoyancy_kg"),
+    "phase": ("phase",),
+}
+"""What a column may be called: speeds through water [m/s], angles [degrees], what is off neutral [cc] or [kg]."""
+MOST_TEXT, MOST_DIVES = 20_000_000, 5_000
+LARGEST = 1e6
+LIMITS = {
+    **{"vertical": (-10.0, 10.0), "horizontal": (0.0, 10.0)},
+    **{"pitch": (-90.0, 90.0), "glide_angle": (-90.0, 90.0)},
+}
+"""Between which a recorded value lies, [m/s] and [degrees]: no glider is ever as fast."""
+PHASES = {"dive": True, "down": True, "climb": False, "up": False}
+
+
+@dataclass(frozen=True)
+class Dives:
+    """Steady glides (n,), as magnitudes, None where the file does not tell: `vertical`, `horizontal` speed [m/s].
+
+    `glide_angle`, `pitch` [rad]; `buoyancy`, off neutral, in its `unit`, cc or kg; `down`: a dive and no climb;
+    `line` of the file (n,); `took`: the column that was taken for what; `unused` columns.
+    """
+
+    vertical: Array
+    horizontal: Array | None
+    glide_angle: Array | None
+    pitch: Array | None
+    buoyancy: Array | None
+    unit: str
+    down: NDArray[np.bool_] | None
+    line: NDArray[np.int64]
+    took: dict[str, str]
+    unused: tuple[str, ...]
+
+
+def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Dives:
+    """Dives out of a CSV file with a header; `columns` names those that are called otherwise.
+
+    A vertical speed is needed, and the horizontal one, a glide angle or a pitch. Dives are told from climbs by
+    a column of phases, or by the signs of pitch, glide angle or vertical speed, below 0 in a dive. InputError
+    where the file lacks what a fit needs, and where a value is no number or has the sign of the other phase.
+    """
+    path = Path(file)
+    header, rows = _table(path)
+    found = _found(path.name, header, columns or {})
+    listed = f"; it has: {', '.join(header)}"
+    require("vertical" in found, f"{path.name} has no column of vertical speeds, name it by `vertical`{listed}")
+    told = {"horizontal", "pitch", "glide_angle"} & set(found)
+    require(bool(told), f"{path.name} must have a horizontal speed, a pitch or a glide angle, name one{listed}")
+    twice = "buoyancy" in found and "net_mass" in found
+    require(not twice, f"{path.name} has a buoyancy in cc and one in kg; leave one out{listed}")
+    if "horizontal" in found:
+        # the two speeds are the glide angle
+        found.pop("glide_angle", None)
+    line = np.array([number for number, _ in rows], np.int64)
+    cells = {what: [row[header.index(column)] for _, row in rows] for what, column in found.items()}
+    values = {}
+    for what, column in found.items():
+        if what != "phase":
+            low, high = LIMITS.get(what, (-LARGEST, LARGEST))
+            values[what] = _numbers(path.name, line, cells[what], column, low, high)
+    down = None
+    if "phase" in found:
+        down = _phases(path.name, line, cells["phase"], found["phase"])
+    else:
+        for what in ("pitch", "glide_angle", "vertical"):
+            if what in values and (values[what] > 0).any() and (values[what] < 0).any():
+                down = values[what] < 0
+                found["phase"] = f"{found[what]}, below 0 in a dive"
+                break
+    for what, one in values.items():
+        _check_signs(path.name, line, one, None if what == "horizontal" else down, found[what])
+        values[what] = np.abs(one)
+    for what in ("pitch", "glide_angle"):
+        if what in values:
+            values[what] = np.radians(values[what])
+    return Dives(
+        vertical=values["vertical"],
+        horizontal=values.get("horizontal"),
+        glide_angle=values.get("glide_angle"),
+        pitch=values.get("pitch"),
+        buoyancy=values.get("buoyancy", values.get("net_mass")),
+        unit="kg" if "net_mass" in found else "cc",
+        down=down,
+        line=line,
+        took=found,
+        unused=tuple(column for column in header if column not in found.values()),
+    )
+
+
+def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header, and the rows with the lines that they stand on."""
+    require(path.is_file(), f"the file of dives {path} does not exist; give a CSV file")
+    size = path.stat().st_size
+    require(size <= MOST_TEXT, f"{path.name} holds {size:,} bytes, more than {MOST_TEXT:,}; cut it")
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as text:
+            first = text.readline()
+            # spreadsheets of some countries write semicolons
+            delimiter = max(",;\t", key=first.count)
+            text.seek(0)
+            reader = csv.reader(text, delimiter=delimiter)
+            header = [name.strip() for name in next(reader, [])]
+            rows = list(_rows(reader, path.name, len(header)))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path.name} cannot be read as CSV: {error}; save it as such") from None
+    require(len(rows) > 0, f"{path.name} must hold a header and dives, a line each; got none")
+    for name in header:
+        require(header.count(name) == 1, f"{path.name} has more than one column `{name}`; rename one")
+    return header, rows
+
+
+def _rows(reader: Iterator[list[str]], name: str, width: int) -> Iterator[tuple[int, list[str]]]:
+    count = 0
+    for row in reader:
+        if not any(cell.strip() for cell in row):
+            continue
+        line = getattr(reader, "line_num", 0)
+        fits = len(row) == width
+        require(fits, f"line {line} of {name} has {len(row)} cells, and the header {width}; mend it")
+        count += 1
+        require(count <= MOST_DIVES, f"{name} must hold at most {MOST_DIVES:,} dives; got more: cut it")
+        yield line, row
+
+
+def _found(name: str, header: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
+    """The column for each of COLUMNS that there is."""
+    for what, column in said.items():
+        require(what in COLUMNS, f"`{what}` is nothing that is read; choose from: {', '.join(COLUMNS)}")
+        require(column in header, f"{name} has no column `{column}`; it has: {', '.join(header)}")
+    found = dict(said)
+    for what, usual in COLUMNS.items():
+        here = [column for column in header if column.lower() in usual and column not in said.values()]
+        if what not in found and here:
+            one = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
+            require(len(here) == 1, one)
+            found[what] = here[0]
+    return found
+
+
+def _numbers(
+    name: str, line: NDArray[np.int64], cells: Sequence[str], column: str, low: float, high: float
+) -> Array:
+    values = np.empty(len(cells))
+    for n, (number, cell) in enumerate(zip(line, cells, strict=True)):
+        where = f"line {number} of {name}: {column} = {cell[:40]!r}"
+        try:
+            value = float(cell)
+        except ValueError:
+            raise InputError(f"{where} is no number; mend it, or leave that dive out") from None
+        require(low < value < high, f"{where} must lie between {low:g} and {high:g}; mend it")
+        require(value != 0, f"{where} is 0, which no dive has; leave that dive out")
+        values[n] = value
+    return values
+
+
+def _phases(name: str, line: NDArray[np.int64], cells: Sequence[str], column: str) -> NDArray[np.bool_]:
+    for number, cell in zip(line, cells, strict=True):
+        known = cell.strip().lower() in PHASES
+        where = f"line {number} of {name}: {column} = {cell[:40]!r}"
+        require(known, f"{where} is no phase; choose from: {', '.join(PHASES)}")
+    return np.array([PHASES[cell.strip().lower()] for cell in cells])
+
+
+def _check_signs(
+    name: str, line: NDArray[np.int64], values: Array, down: NDArray[np.bool_] | None, column: str
+) -> None:
+    """Magnitudes or signed: either way a phase has one sign, and what has the other is a mistake, not a glide."""
+    for part in [np.full(values.size, True)] if down is None else [down, ~down]:
+        odd = part & (np.sign(values) != np.sign(values[part][:1].sum()))
+        if odd.any():
+            number, value = line[odd][0], values[odd][0]
+            where = f"line {number} of {name}: {column} = {value:g}"
+            raise InputError(f"{where} has another sign than the dives of its phase before it; mend it")
+    if down is not None and 0 < down.sum() < down.size and (values < 0).all():
+        where = f"line {line[~down][0]} of {name}: {column} = {values[~down][0]:g}"
+        raise InputError(f"{where} is below 0 in a climb as in a dive; mend its sign, or the phase")

@@ -1,0 +1,109 @@
+"""Fits: values of a vehicle by least squares, and their standard errors."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dives import Dives
+from .flown import Flown, distances
+from .glider import Glider
+
+Array = NDArray[np.float64]
+
+SPEED_ERROR, ANGLE_ERROR = 0.01, math.radians(1.0)
+"""What a recorded speed [m/s] and angle [rad] may err by, as far as their ratio is not seen in the dives."""
+FINEST = 0.01
+"""Of these errors: no scatter is taken to be smaller."""
+REWEIGHTED = 10
+"""At most so often are instruments weighed anew."""
+STEP = 1e-5
+"""Of a logarithm, for the Jacobian: far above what the models are solved to."""
+CLOSE = 1e-7
+"""Of logarithms and of the sum of squares: a fit is found."""
+FURTHEST_MAIN = 3.5
+FURTHEST = {"induced_drag": 3.0, "drag_alpha2": 3.0, "lift": 1.5, "lift_alpha": 1.5}
+"""How far ln(value / preset's) may go: of a buoyancy or a parasite drag; of others."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Logarithms of values over the preset's, their standard errors; whether one stands at its bound."""
+
+    names: tuple[str, ...]
+    logs: Array
+    errors: Array
+    bound: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is fitted: `dives`, and the preset with its `own` volume off neutral [cc].
+
+    `kinds` of instruments; `groups` (n,) of dives that share a volume to be found, or the `recorded` ones (n,).
+    """
+
+    dives: Dives
+    base: Glider
+    own: float
+    kinds: tuple[str, ...]
+    groups: dict[str, NDArray[np.bool_]]
+    recorded: Array | None
+
+    def flown(self, names: tuple[str, ...], logs: Array) -> Flown:
+        """The vehicle with fitted values."""
+        ratio = dict(zip(names, np.exp(logs), strict=True))
+        volumes = np.full(self.dives.vertical.size, self.own) if self.recorded is None else self.recorded
+        for name, group in self.groups.items():
+            volumes = np.where(group, self.own * ratio[name], volumes)
+        return Flown(self.base, self.values(ratio), volumes)
+
+    def flat(self, fit: Fit) -> NDArray[np.bool_]:
+        """Which dives (n,) are flatter than a fitted vehicle can glide."""
+        flown = self.flown(fit.names, fit.logs)
+        return np.asarray(flown.angle(self.dives) <= flown.flattest)
+
+    def values(self, ratio: dict[str, float]) -> dict[str, float]:
+        """Coefficients of the model, of ratios to the preset's."""
+        return {name: getattr(self.base, name) * float(x) for name, x in ratio.items() if name not in self.groups}
+
+    def fit(self, names: tuple[str, ...], start: dict[str, float]) -> Fit:
+        """Plain least squares of the distances, in what instruments may err by.
+
+        Speeds and angles are weighed by their own scatter where a dive has three records (Förstner 1979): two
+        do not tell which of them erred. From `start`, logarithms by name: begun where fewer values fit best,
+        a fit is never worse for having more.
+        """
+        from scipy.optimize import least_squares
+
+        angles = np.array([kind in ("glide_angle", "pitch") for kind in self.kinds])
+        finest = np.where(angles, ANGLE_ERROR, SPEED_ERROR)
+        scale, logs = finest.copy(), np.array([start.get(name, 0.0) for name in names])
+        far = np.array([FURTHEST.get(name, FURTHEST_MAIN) for name in names])
+        blocks = [angles, ~angles] if angles.any() and len(self.kinds) > 2 else []
+        for _ in range(REWEIGHTED if blocks else 1):
+
+            def residuals(logs: Array, scale: Array = scale) -> Array:
+                return distances(self.flown(names, logs), self.kinds, self.dives, scale)[0].ravel()
+
+            steps = np.full(len(names), STEP)
+            found = least_squares(
+                residuals, logs, bounds=(-far, far), x_scale=0.1, diff_step=steps, xtol=CLOSE, ftol=CLOSE
+            )
+            logs, jac = np.asarray(found.x), np.asarray(found.jac)
+            off, tangent = distances(self.flown(names, logs), self.kinds, self.dives, scale)
+            # what is left of each residual when the dive's angle and the parameters are taken from it
+            left = 1 - tangent**2 / (tangent**2).sum(axis=1, keepdims=True)
+            left -= (np.linalg.qr(jac)[0] ** 2).sum(axis=1).reshape(off.shape)
+            before = scale.copy()
+            for block in blocks:
+                spread = math.sqrt((off[:, block] ** 2).sum() / max(left[:, block].sum(), 1e-3))
+                scale[block] = np.maximum(scale[block] * spread, FINEST * finest[block])
+            if np.abs(scale / before - 1).max() < 0.01:
+                break
+        free = off.size - off.shape[0] - len(names)
+        _, singular, rows = np.linalg.svd(jac, full_matrices=False)
+        spread = math.sqrt(float((off**2).sum()) / free)
+        errors = spread * np.linalg.norm(rows.T / np.maximum(singular, 1e-12), axis=1)
+        return Fit(names, logs, errors, np.abs(logs) > 0.999 * far)

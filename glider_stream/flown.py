@@ -1,0 +1,114 @@
+"""A vehicle as its instruments record it: what dives are compared with."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dives import Dives
+from .glider import Glider, Seaglider, SteadyGlide
+
+Array = NDArray[np.float64]
+
+DENSITY = 1024.0
+"""Of sea water [kg/m^3], where a model has none, to make a mass of a volume; that of the preset `slocum`."""
+STEEP = (89.0, 89.9)
+"""A range of angles [degrees] that no coefficients in reach of a fit make infeasible."""
+MASS_NODES = 3
+"""Volumes at which a glider is evaluated where each dive has its own; a polynomial in ln(volume) between."""
+NEAREST_STEPS = 3
+
+
+def per_volume(base: Glider) -> float:
+    """Net mass for each cc off neutral [kg]."""
+    return 1e-6 * (base.density if isinstance(base, Seaglider) else DENSITY)
+
+
+def vehicle(base: Glider, values: dict[str, float], dive: float, climb: float, **more: Any) -> Glider:
+    """The base glider with other coefficients, and so many cc off neutral in either phase."""
+    angles: dict[str, Any] = {"angles": STEEP, **values, **more}
+    if isinstance(base, Seaglider):
+        return replace(base, dive_volume=dive, climb_volume=climb, **angles)
+    assert isinstance(base, SteadyGlide)
+    unit = per_volume(base)
+    return replace(base, offset=climb * unit, ballast_max=(dive + climb) * unit, **angles)
+
+
+class Flown:
+    """What dives (n,) of one vehicle record at glide angles; each its volume [cc], or that of its phase."""
+
+    def __init__(self, base: Glider, values: dict[str, float], volumes: Array) -> None:
+        self.volumes = volumes
+        own = np.unique(volumes)
+        if own.size > MASS_NODES:
+            # Chebyshev's nodes: the speed is nearly a power of the volume, the angle of attack hardly changes
+            low, high = np.log(own[[0, -1]])
+            place = np.cos(np.pi * (np.arange(MASS_NODES) + 0.5) / MASS_NODES)
+            own = np.exp(0.5 * (low + high) + 0.5 * (high - low) * place)
+        logs, at = np.log(own), np.log(volumes)
+        self.weight = np.ones((own.size, volumes.size))
+        for n, m in np.ndindex(own.size, own.size):
+            if n != m:
+                self.weight[n] *= (at - logs[m]) / (logs[n] - logs[m])
+        self.gliders = [vehicle(base, values, volume, volume) for volume in own]
+        # a little inside, where rounding leaves a glide
+        self.flattest = max(abs(one.limits[0]) for one in self.gliders) + 1e-9
+
+    def within(self, angle: Array) -> Array:
+        """The nearest angles that can be flown."""
+        return np.clip(angle, self.flattest, math.radians(STEEP[1]))
+
+    def speed(self, angle: Array) -> Array:
+        """V [m/s]."""
+        speeds = [one.speed(-angle) for one in self.gliders]
+        return np.asarray(np.exp((self.weight * np.log(speeds)).sum(axis=0)))
+
+    def attack(self, angle: Array) -> Array:
+        """The angle of attack [rad]."""
+        attacks = [one.angle_of_attack(-angle) for one in self.gliders]
+        return np.asarray((self.weight * attacks).sum(axis=0))
+
+    def recorded(self, kinds: Sequence[str], angle: Array) -> Array:
+        """What instruments would say, (n, kinds)."""
+        speed = self.speed(angle)
+        said = {"vertical": speed * np.sin(angle), "horizontal": speed * np.cos(angle), "glide_angle": angle}
+        if "pitch" in kinds:
+            said["pitch"] = angle - self.attack(angle)
+        return np.stack([said[kind] for kind in kinds], axis=1)
+
+    def angle(self, dives: Dives) -> Array:
+        """The recorded glide angles [rad], or those of the recorded pitch; as near as the vehicle can fly."""
+        if dives.horizontal is not None:
+            return self.within(np.arctan2(dives.vertical, dives.horizontal))
+        if dives.glide_angle is not None:
+            return self.within(dives.glide_angle)
+        assert dives.pitch is not None
+        # near the limit of a steady glide alpha grows, and the pitch with it: the steeper of the two is flown
+        middle = self.gliders[len(self.gliders) // 2]
+        table = np.linspace(self.flattest, math.radians(STEEP[1]), 500)
+        nose = table - np.abs(middle.angle_of_attack(-table))
+        first = int(nose.argmin())
+        angle = self.within(np.interp(dives.pitch, nose[first:], table[first:]))
+        for _ in range(4):
+            angle = self.within(dives.pitch + self.attack(angle))
+        return angle
+
+
+def distances(model: Flown, kinds: Sequence[str], dives: Dives, scale: Array) -> tuple[Array, Array]:
+    """How far each dive lies from the vehicle's curve, (n, kinds), in `scale`; the curve's tangents there.
+
+    The true glide angle of a dive is as unknown as its speed: the nearest point of the curve is taken, so that
+    errors of every instrument count, and none flattens the fit.
+    """
+    recorded = np.stack([getattr(dives, kind) for kind in kinds], axis=1)
+    angle, step = model.angle(dives), 1e-5
+    for _ in range(NEAREST_STEPS):
+        here = model.recorded(kinds, angle)
+        tangent = (model.recorded(kinds, angle + step) - here) / step / scale
+        off = (recorded - here) / scale
+        length = np.maximum((tangent**2).sum(axis=1), 1e-12)
+        angle = model.within(angle + np.clip((tangent * off).sum(axis=1) / length, -0.1, 0.1))
+    return (recorded - model.recorded(kinds, angle)) / scale, tangent
