@@ -69,6 +69,7 @@ class _Lattice:
 
     def __init__(self, before: Problem, now: Problem, position: Array) -> None:
         self.before, self.now, self.position = before, now, position
+        self._known: dict[int, tuple[Any, Any]] = {}
         integration = now.evaluator.integration
         self.horizon = integration.dt * integration.steps
         self.glide = float(now.evaluator.polar.best_horizontal.max())
@@ -115,9 +116,16 @@ class _Lattice:
 
     def _touched(self, grid: Grid | OceanGrid | Seabed, points: Bools) -> Bools:
         """The cells that read one of the grid's `points` (ni, nj)."""
-        x, y = np.meshgrid(
-            *(self.low[n] + self.step * np.arange(self.count[n] + 1) for n in range(2)), indexing="ij"
-        )
+        (i, j), (k, m) = self._reads(grid, points.shape)
+        sums = np.pad(points.astype(np.int64).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+        return np.asarray(sums[k, m] - sums[i, m] - sums[k, j] + sums[i, j] > 0)
+
+    def _reads(self, grid: Grid | OceanGrid | Seabed, shape: tuple[int, ...]) -> tuple[Any, Any]:
+        """The first point of a grid that each cell reads, and that after the last, (2, ni, nj) each."""
+        if id(grid) in self._known:
+            return self._known[id(grid)]
+        axes = (self.low[n] + self.step * np.arange(self.count[n] + 1) for n in range(2))
+        x, y = np.meshgrid(*axes, indexing="ij")
         at = np.stack([(x - grid.x_lo) * grid.per_x, (y - grid.y_lo) * grid.per_y])
         if not isinstance(grid, Grid):
             at = np.stack(
@@ -125,12 +133,11 @@ class _Lattice:
             )
         corners = np.stack([at[:, :-1, :-1], at[:, 1:, :-1], at[:, :-1, 1:], at[:, 1:, 1:]])
         # a point is read in the cells around it; one more for the bend of a map between corners
-        most = np.array(points.shape)[:, None, None] - 1
+        most = np.array(shape)[:, None, None] - 1
         low = np.clip(np.floor(corners.min(axis=0)).astype(np.int64) - 1, 0, most)
         high = np.clip(np.ceil(corners.max(axis=0)).astype(np.int64) + 1, 0, most) + 1
-        sums = np.pad(points.astype(np.int64).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-        (i, j), (k, m) = low, high
-        return np.asarray(sums[k, m] - sums[i, m] - sums[k, j] + sums[i, j] > 0)
+        self._known[id(grid)] = low, high
+        return low, high
 
     def away_from(self, changed: Bools) -> Bools:
         """Nodes from which no path meets a changed cell within the horizon, and no pair looks into one."""
