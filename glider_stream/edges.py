@@ -273,9 +273,3 @@ class Evaluator:
             ],
             dtype=bool,
         )
-
-
-def count_statuses(outcomes: Array) -> dict[str, int]:
-    """How many pairs ended in each status, by its name in lower case."""
-    counts = np.bincount(outcomes[:, 0].astype(np.int64), minlength=len(Status))
-    return {status.name.lower(): int(counts[status]) for status in Status}

@@ -1,13 +1,28 @@
-"""Untrusted HDF5 files: what may not be followed, before anything is read."""
+"""Untrusted HDF5, and other packed files: what may not be followed, nor believed, before anything is read."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
 
 from .settings import require
 
+MOST_RATIO = 1100
+"""Deflate packs no better than 1032 to 1: data that claim more than that of their file are none."""
+FREE = 50_000_000
+"""Claims up to this size [bytes] need no proof."""
 MOST_OBJECTS = 10_000
 """No current file and no roadmap holds as many groups and datasets."""
+
+
+def check_claim(file: str | Path, name: str, shape: Sequence[int], itemsize: int, held: int) -> None:
+    """InputError, before room is made, if data `name` claim more than a file of `held` bytes can hold."""
+    claimed = math.prod(shape) * itemsize
+    require(
+        claimed <= max(FREE, MOST_RATIO * held),
+        f"{file} is damaged: {name} claims {float(claimed):.3g} bytes, which {held:,} cannot hold; make it again",
+    )
 
 
 def check_links(path: str | Path) -> None:

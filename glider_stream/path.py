@@ -78,7 +78,8 @@ class Path:
 
     From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
     `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, if that is known.
-    `unthinned`: how many legs and seconds it had before it was thinned.
+    `unthinned`: how many legs and seconds it had before it was thinned. `least_time` [s]: no path within the
+    bound on energy that was asked for takes less.
     """
 
     start: Array
@@ -90,6 +91,7 @@ class Path:
     unit: str = "s"
     why: str = ""
     unthinned: tuple[int, float] | None = None
+    least_time: float | None = None
 
     @property
     def found(self) -> bool:
@@ -118,6 +120,7 @@ class Path:
             "cost": self.cost if self.found else None,
             **energy,
             **thinned,
+            **({} if self.least_time is None else {"least_time_s": self.least_time}),
             "legs": [leg.as_dict() for leg in self.legs],
         }
 
@@ -134,6 +137,8 @@ class Path:
         hours = f" ({self.travel_time / 3600:.1f} h)" if self.travel_time >= 7200 else ""
         energy = f", {self.cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s{hours}{energy}"
+        if self.least_time is not None:
+            title += f"; no path within the bound takes less than {self.least_time:,.0f} s"
         if self.unthinned is not None:
             title += f"; before it was thinned {self.unthinned[0]}, {self.unthinned[1]:,.0f} s"
         return "\n".join([title, *(f"  {leg}" for leg in self.legs)])

@@ -11,7 +11,6 @@ import numpy as np
 
 from .card import Card
 from .card import card as card_of
-from .change import untouched
 from .difference import Difference, difference
 from .domain import Array, GeographicDomain, Point
 from .drawn import read_drawn
@@ -92,6 +91,8 @@ def _build(
     address, older = job.pop("scheduler", None), job.pop("base", None)
     problem = scenario.problem()
     if older is not None:
+        from .change import untouched
+
         road = info(older)
         before = scenario_from_text(road.provenance.scenario).problem()
         check_unchanged(road, before)
@@ -166,7 +167,9 @@ def query(
         why = (
             f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}" if last.found else ""
         )
-        path = front.within(most_energy) or replace(last, cost=math.inf, legs=(), why=why)
+        within = front.within(most_energy)
+        least = front.least_time(most_energy)
+        path = replace(within, least_time=least) if within else replace(last, cost=math.inf, legs=(), why=why)
     if thin is not None:
         path = _with_fewer_legs(path, thin, search, most_energy)
     for output in outputs:

@@ -60,6 +60,8 @@ class Blend:
 
     def of(self, cost: Any, time: Any) -> Any:
         """The sum of legs."""
+        if self == Blend():
+            return cost  # what most queries ask for, of all edges
         return self.cost * cost + self.time * time
 
 
@@ -194,7 +196,7 @@ class Planner:
         return np.flatnonzero((self.roadmap.position == place).all(axis=1)), place
 
     @cached_property
-    def _graph(self) -> tuple[Index, NDArray[np.int32], NDArray[np.int32], Array | None]:
+    def _graph(self) -> tuple[Index | slice, NDArray[np.int32], NDArray[np.int32], Array | None]:
         """The edge behind each way between states, the state it leads to, each state's first way, its turn.
 
         The turn's cost is that of a climb from a state that was come to by a dive. There is room for the
@@ -204,7 +206,7 @@ class Planner:
         room = np.empty(nodes, np.int32)
         if turns is None:
             target = np.concatenate([road.target, room])
-            return np.arange(road.target.size), target, np.append(road.indptr, 0).astype(np.int32), None
+            return slice(None), target, np.append(road.indptr, 0).astype(np.int32), None
         degree = np.repeat(np.diff(road.indptr), 2)
         first = np.concatenate([[0], np.cumsum(degree)])
         ways = np.arange(first[-1]) - np.repeat(first[:-1] - np.repeat(road.indptr[:-1], 2), degree)
@@ -230,8 +232,9 @@ class Planner:
 
     def _search(self, start: End, blend: Blend) -> _Search:
         """Dijkstra's algorithm from a start."""
-        (ways, target, indptr, turn), cost = self._graph, self._costs(blend)
-        states, first, last = len(indptr) - 2, len(ways), len(ways)
+        (_, target, indptr, turn), cost = self._graph, self._costs(blend)
+        states = len(indptr) - 2
+        first = last = int(indptr[states])
         origin = int(start.nodes[0]) * self._phases if start.nodes.size else states
         if start.legs is not None:
             rows, to = start.legs.outcomes, start.legs.nodes

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, Unwritable
-from .hdf5 import check_links
+from .hdf5 import check_claim, check_links
 from .kernels.edges import Status
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, Tally
 from .settings import require
@@ -40,10 +40,6 @@ _DESCRIBED = {
     "pairs/by_node": ("i4", "1", "pairs of each source node by status, in the order of the attribute `statuses`"),
 }
 _OPTIONAL = {"nodes/lonlat", "pairs/by_node"}
-MOST_RATIO = 1100
-"""Deflate packs no better than 1032 to 1: a dataset that claims more than that of its file is none."""
-FREE = 50_000_000
-"""Claims up to this size [bytes] need no proof."""
 
 
 @dataclass(frozen=True)
@@ -360,9 +356,7 @@ def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, Array]:
         if name in _OPTIONAL and name not in file:
             continue
         require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
-        claimed = float(np.prod(file[name].shape, dtype=np.float64)) * file[name].dtype.itemsize
-        fits = claimed <= max(FREE, MOST_RATIO * held)
-        require(fits, f"the roadmap {path} is damaged: {name} claims {claimed:.3g} bytes; build it again")
+        check_claim(path, name, file[name].shape, file[name].dtype.itemsize, held)
         stored = np.asarray(file[name][()])
         fits = stored.dtype.kind == np.dtype(kind).kind
         require(fits, f"the roadmap {path} is damaged: {name} is {stored.dtype}, not {kind}; build it again")

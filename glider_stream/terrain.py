@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from .errors import InputError
 from .frame import LocalFrame
@@ -85,6 +84,8 @@ class Raster:
 
     def add_bottom(self, bottom: Bottom) -> None:
         """Take the highest of all points that a place in a cell may read."""
+        from scipy.ndimage import maximum_filter  # a twentieth of a second, which few starts need
+
         at = bottom.grid.indices(self.frame, *self._corners())
         ni, nj = self.count
         at = at.reshape(ni, 2, nj, 2, 2).transpose(0, 2, 1, 3, 4).reshape(ni, nj, 4, 2)
@@ -124,6 +125,8 @@ class Raster:
         """The bottom as the kernels read it."""
         closed = self.land | np.isposinf(self.bottom)
         if land_distance > 0 and self.land.any():
+            from scipy.ndimage import distance_transform_edt
+
             # from the edge of a cell, not from its middle
             near = distance_transform_edt(~self.land) * self.step - self.step * math.sqrt(0.5) <= land_distance
             closed |= near

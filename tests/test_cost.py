@@ -133,6 +133,11 @@ def test_from_the_command_line(capsys, tmp_path, monkeypatch):
     bound = f"{math.ceil(front[0]['energy_j'])}"
     fast = strict_json(command(capsys, "query", "road.h5", "--most-energy", bound, "--json").out)
     assert fast["travel_time_s"] == pytest.approx(front[0]["travel_time_s"])
+    assert fast["least_time_s"] == pytest.approx(front[0]["travel_time_s"])
+    if len(front) > 1:
+        tight = f"{math.ceil(front[1]['energy_j'])}"
+        told = strict_json(command(capsys, "query", "road.h5", "--most-energy", tight, "--json").out)
+        assert front[0]["travel_time_s"] < told["least_time_s"] <= told["travel_time_s"]
     none = command(capsys, "query", "road.h5", "--most-energy", "1")
     assert (none.code, "the least that one takes is" in none.err) == (1, True)
     command(capsys, "build", "small.toml", "-o", "time.h5")

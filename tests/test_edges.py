@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.edges import IntegrationSettings, StreamlineMethod, SurfaceMethod, count_statuses
+from glider_stream.edges import IntegrationSettings, StreamlineMethod, SurfaceMethod
 from glider_stream.errors import InputError
 from glider_stream.flow import Uniform, Vortex, Vortices, sample_flow
 from glider_stream.kernels.connect import connect_nodes
@@ -33,6 +33,12 @@ from glider_stream.threads import threads
 both_methods = pytest.mark.parametrize("method", [StreamlineMethod, SurfaceMethod])
 METRES = 1e-9
 """Misses of paths some hundred metres long, in coordinates of some hundred metres."""
+
+
+def count_statuses(outcomes):
+    """How many pairs ended in each status, by its name in lower case."""
+    counts = np.bincount(outcomes[:, 0].astype(np.int64), minlength=len(Status))
+    return {status.name.lower(): int(counts[status]) for status in Status}
 
 
 def nodes(count, seed, reach=150.0):

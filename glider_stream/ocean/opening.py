@@ -1,7 +1,6 @@
 """Opening ocean files, which are untrusted: NetCDF of either kind and Zarr, by xarray."""
 
 import json
-import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,13 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..hdf5 import check_links
+from ..hdf5 import check_claim, check_links
 from ..settings import require
 
-MOST_RATIO = 1100
-"""Deflate packs no better than 1032 to 1: a file that claims to hold more than that holds nothing."""
-FREE = 50_000_000
-"""Claims up to this size [bytes] need no proof."""
 MOST_STORE_FILES = 100_000
 """Files of a Zarr store that are looked at."""
 
@@ -94,9 +89,4 @@ def _check_claims(path: Path, data: Any) -> None:
     """Refuse what no file of its size can hold, before room is made for it."""
     held = sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) if path.is_dir() else path.stat().st_size
     for name, variable in data.variables.items():
-        claimed = math.prod(variable.shape) * variable.dtype.itemsize
-        require(
-            claimed <= max(FREE, MOST_RATIO * held),
-            f"`{name}` in {path.name} claims {claimed:.3g} bytes, more than a file of {held:,} bytes can hold; "
-            "it is damaged, or empty",
-        )
+        check_claim(path.name, f"`{name}`", variable.shape, variable.dtype.itemsize, held)

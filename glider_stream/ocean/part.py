@@ -16,7 +16,7 @@ class Part:
     """One component out of one file, on points of its own.
 
     `way`: "east", "grid" or "unsure", along what it runs. `signs`: of the plane's axes that the file counts
-    downward. `fields`: what the file says at places of their own: `angle`, `mask`, `seabed`.
+    downward. `fields`: what the file says at places of their own: `angle`, `seabed`.
     """
 
     component: str
