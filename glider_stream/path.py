@@ -14,6 +14,8 @@ from .errors import InputError
 from .settings import require
 
 Array = NDArray[np.float64]
+MOST_TEXT = 200_000_000
+"""The most that a path file may hold [bytes]; a route of a thousand legs has some five million."""
 LARGEST = 1e12
 """A number [m, s] in a path file beyond it is no place or time on Earth."""
 
@@ -147,6 +149,8 @@ class Path:
 def load_path(file: str | File) -> Path:
     """Read a path file (JSON) that `query` wrote; InputError where it is not one, or holds no leg."""
     try:
+        size = File(file).stat().st_size
+        require(size <= MOST_TEXT, f"it holds {size:,} bytes, more than a path needs ({MOST_TEXT:,})")
         table = json.loads(File(file).read_text(encoding="utf-8"))
         require(isinstance(table, dict) and isinstance(table.get("legs"), list), "it has no list `legs`")
         require(len(table["legs"]) > 0, "it holds no leg, so there is nothing to draw")

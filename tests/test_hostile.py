@@ -239,6 +239,13 @@ def test_a_header_that_claims_much(good, tmp_path):
         bounded_raises(load_currents, tmp_path / "four.nc")
 
 
+def test_a_path_file_that_is_huge(tmp_path):
+    with (tmp_path / "path.json").open("wb") as stream:
+        stream.truncate(2 * 10**9)
+    with pytest.raises(InputError, match="more than a path needs"):
+        bounded_raises(load_path, tmp_path / "path.json")
+
+
 def bounded_raises(read, path):
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     before = resource.getrlimit(resource.RLIMIT_AS)

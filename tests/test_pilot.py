@@ -173,14 +173,6 @@ def test_a_drawn_route(capsys, tmp_path, monkeypatch):
     assert set(REASONS) == set(Status) - {Status.CONNECTED}
 
 
-@pytest.mark.parametrize("form", [".geojson", ".kml", ".gpx"])
-def test_our_own_exports_are_drawn_routes(tmp_path, form):
-    export_path(route(), tmp_path / f"route{form}")
-    lon, lat, depth = np.array(read_drawn(tmp_path / f"route{form}").places).T
-    x, y = FRAME.to_local(lon, lat)
-    assert np.abs(np.stack([x, y, -depth], axis=-1) - np.array(STOPS)).max() < 1.0
-
-
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
