@@ -56,13 +56,13 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import map_coordinates
 from scipy.optimize import minimize
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
+from glider_stream.base.settings import require
 from glider_stream.flow import is_steady
 from glider_stream.kernels.flow import velocities
 from glider_stream.kernels.motion import rk4_step
 from glider_stream.roadmap import Problem
 from glider_stream.scenario import read_scenario
-from glider_stream.settings import require
 
 GRIDS = ("51,51,31", "101,101,61", "201,201,61")
 TAUS = (40, 60, 80, 100)

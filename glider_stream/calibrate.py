@@ -9,17 +9,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array
+from .base.errors import InputError
+from .base.settings import require
 from .calibration import CONFIDENCE, Calibration, Parameter, scatter
 from .dives import Dives
-from .errors import InputError
 from .fit import FURTHEST_MAIN, Fit, Problem
 from .flown import per_volume, vehicle
 from .glider import PRESETS, Glider, Seaglider, SteadyGlide, polar
-from .settings import require
-
-Array = NDArray[np.float64]
 
 VEHICLES = ("seaglider", "slocum")
 KEYS: dict[type[Glider], tuple[str, str, str]] = {

@@ -4,13 +4,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array
+from .base.toml import to_toml
 from .dives import Dives
 from .glider import MODELS, Glider
-from .toml import to_toml
-
-Array = NDArray[np.float64]
 
 CONFIDENCE = 0.99
 """The share of further dives that the uncertainty shown is to hold."""

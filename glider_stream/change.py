@@ -4,20 +4,17 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates, maximum_filter
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from .base.arrays import Array, Bools
+from .base.settings import require
 from .edges import FlowMapMethod
 from .kernels.flow import Flow, Grid, OceanGrid
 from .kernels.terrain import Seabed
 from .legs import NeighbourLegs
 from .roadmap import Problem, Roadmap, node_positions, provenance_of
-from .settings import require
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SIDE = 480
 """Cells along the longer side of the lattice that times are bounded on."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .errors import InputError, Stopped
+from .base.errors import InputError, Stopped
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -81,7 +81,7 @@ def build(
     What is found is kept beside the output until it is whole: the same command goes on where it was stopped.
     """
     from . import planner
-    from .progress import reporter
+    from .base.progress import reporter
 
     given = {"base": base, "scheduler": scheduler, "checkpoint": checkpoint}
     job = {name: value for name, value in given.items() if value is not None}

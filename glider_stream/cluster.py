@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import Array, Index
-from .errors import InputError
+from .base.arrays import Array, Index
+from .base.errors import InputError
+from .base.settings import require
+from .base.threads import threads
 from .kernels.cache import KERNEL_DIGEST
 from .roadmap import Edges, Problem, find_edges, warm_up
-from .settings import require
-from .threads import threads
 
 AHEAD = 4
 """Chunks that wait at the scheduler for each thread of a worker."""

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .base.arrays import Array
+from .base.settings import require
 from .kernels import cost
-from .settings import require
 
-Array = NDArray[np.float64]
 GRAVITY = 9.81
 
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .base.settings import require
 from .roadmap import EDGE_FIELDS, Roadmap
-from .settings import require
 
 WORDS = {
     "flow_sha256": "flow",

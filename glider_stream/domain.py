@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .flow import Range, check_range
-from .settings import from_table, require
+from .base.arrays import Array
+from .base.checks import Range, check_range
+from .base.settings import from_table, require
 
 if TYPE_CHECKING:
     from .frame import LocalFrame
 
-Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 

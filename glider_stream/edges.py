@@ -7,17 +7,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .base.arrays import Array, Index
+from .base.checks import LONGEST, WIDEST
+from .base.settings import require
+from .base.threads import in_parallel
 from .bins import node_bins
 from .cost import Cost, TravelTime
-from .flow import LONGEST, WIDEST, is_steady
+from .flow import is_steady
 from .kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
-from .settings import require
-from .threads import in_parallel
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 MAX_CANDIDATES = 1_000_000
 NODES_AT_ONCE = 16
 """Source nodes that a thread takes at once: few, since their work differs a hundredfold."""

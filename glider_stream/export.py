@@ -14,12 +14,12 @@ from pathlib import Path as File
 from typing import Any
 from xml.etree import ElementTree as Xml
 
+from .base.output import check_output, replacing
+from .base.settings import require
 from .frame import wrapped
 from .path import Leg, Path
 from .seaglider import targets
-from .settings import require
 from .slocum import list_number, mission_files
-from .store import check_output, replacing
 from .windows import HOURS, Window, windows
 
 Texts = dict[str, str]

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .base.arrays import Array
 from .dives import Dives
 from .flown import Flown, distances
 from .glider import Glider
-
-Array = NDArray[np.float64]
 
 SPEED_ERROR, ANGLE_ERROR = 0.01, math.radians(1.0)
 """What a recorded speed [m/s] and angle [rad] may err by, as far as their ratio is not seen in the dives."""

@@ -8,41 +8,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array
+from .base.checks import Range, check_range, require_positive
+from .base.settings import require
+from .base.threads import in_parallel
 from .kernels import flow as kernel
 from .kernels.terrain import Terrain
-from .settings import require
-from .threads import in_parallel
-
-Range = tuple[float, float]
-Array = NDArray[np.float64]
 
 ALWAYS = (-math.inf, math.inf)
 BEYOND = 50.0
 """How far [m] a path may pass the depths of the domain: the bound of the speed holds there too."""
-LONGEST = 1e9
-"""The longest time [s] that a scenario may speak of: beyond, clocks lose their microseconds."""
-WIDEST = 1e9
-"""Longest side of a box [m]."""
-FASTEST = 100.0
-"""Greatest current [m/s] that is taken for one."""
 LINES_AT_ONCE = 8
 """Lines of a sampled grid that a thread takes at once."""
 MAX_SAMPLES = 100_000_000
 """Largest grid [points] that `sampled` makes: 1.6 GB."""
-
-
-def check_range(bounds: Range, where: str) -> None:
-    """InputError unless lo < hi."""
-    require(bounds[0] < bounds[1], f"`{where}` must rise; got [{bounds[0]:g}, {bounds[1]:g}]")
-    wide = bounds[1] - bounds[0] > WIDEST
-    require(not wide, f"`{where}` must span {WIDEST:g} at most; got [{bounds[0]:g}, {bounds[1]:g}]")
-
-
-def require_positive(value: float, where: str) -> None:
-    """InputError unless the value is above zero."""
-    require(value > 0, f"`{where}` must be above 0; got {value:g}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,12 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array
 from .dives import Dives
 from .glider import Glider, Seaglider, SteadyGlide
-
-Array = NDArray[np.float64]
 
 DENSITY = 1024.0
 """Of sea water [kg/m^3], where a model has none, to make a mass of a volume; that of the preset `slocum`."""

@@ -6,13 +6,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .errors import InputError
-from .settings import require
-
-Array = NDArray[np.float64]
-Range = tuple[float, float]
+from .base.arrays import Array
+from .base.checks import Range
+from .base.errors import InputError
+from .base.settings import require
 
 MAX_SCALE_ERROR = 0.01
 """Beyond this the frame's metres are no longer metres: some 2500 km from side to side."""

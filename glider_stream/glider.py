@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError
+from .base.errors import InputError
+from .base.settings import from_kinds, from_table, require
 from .kernels.control import CLIMB, DIVE, Polar
 from .kernels.flow import Array
-from .settings import from_kinds, from_table, require
 
 POLAR_TOLERANCE = 1e-7  # relative error of the table, linear between its angles
 POLAR_STEPS = (256, 65536)  # fewest and most steps of the table

@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, Stopped, Unwritable
+from .base.arrays import Array, Index
+from .base.errors import InputError, Stopped, Unwritable
+from .base.lock import locked
+from .base.output import check_output
+from .base.settings import require
+from .base.threads import threads
 from .journal import Journal
-from .lock import locked
 from .roadmap import (
     BATCH_PAIRS,
     EDGE_FIELDS,
@@ -27,12 +31,8 @@ from .roadmap import (
     provenance_of,
     warm_up,
 )
-from .settings import require
-from .store import Shard, check_output, read_part, writing
-from .threads import threads
+from .store import Shard, read_part, writing
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Finder = Callable[[Problem, Array, Index, int], Iterator[Edges]]
 CHECKPOINT = 30.0
 """Seconds between two requests that the disk keep what was found."""

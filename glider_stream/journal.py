@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError
+from .base.errors import InputError
 from .roadmap import EMPTY, Edges
 
 MAGIC = b"glider-stream/journal 1\n"

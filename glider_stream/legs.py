@@ -4,14 +4,12 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array, Index
 from .edges import Evaluator, FlowMapMethod
 from .flow import is_steady
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 SAMPLED = 16
 """Nodes whose pairs are counted before any work is cut."""
 

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from .settings import require
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from .base.arrays import Array, Index
+from .base.settings import require
 
 
 class Neighbourhood(Protocol):

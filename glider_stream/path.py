@@ -8,12 +8,11 @@ from pathlib import Path as File
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .errors import InputError
-from .settings import require
+from .base.arrays import Array
+from .base.errors import InputError
+from .base.settings import require
 
-Array = NDArray[np.float64]
 MOST_TEXT = 200_000_000
 """The most that a path file may hold [bytes]; a route of a thousand legs has some five million."""
 LARGEST = 1e12

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .base.arrays import Array
+from .base.output import check_output, replacing
+from .base.settings import require
 from .card import Card
 from .card import card as card_of
 from .difference import Difference, difference
-from .domain import Array, GeographicDomain, Point
+from .domain import GeographicDomain, Point
 from .drawn import read_drawn
 from .export import check_export, export_path
 from .jobs import Job, build_file, shard_of
@@ -23,8 +26,7 @@ from .roadmap import Progress, Roadmap, build_roadmap, node_positions
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .score import Score
 from .score import score as score_of
-from .settings import require
-from .store import check_output, read_roadmap, replacing
+from .store import read_roadmap
 from .surfacing import Surfacing, SurfacingPlanner
 from .thin import thin as thinned
 from .trade_off import TradeOff
@@ -276,7 +278,7 @@ def plot(
         plot_route,
         save_figure,
         save_page,
-    )  # fmt: skip
+    )
 
     as_page = output is not None and File(output).suffix.lower() == PAGE
     if output is not None:

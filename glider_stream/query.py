@@ -11,16 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from .base.arrays import Array, Index
+from .base.settings import require
 from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.edges import Edge, Status
 from .legs import Attached, Legs
 from .path import Leg, Path
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
-from .settings import require
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
 """By how much a leg that is flown again may miss by more than the tolerance, in tolerances: as in verify."""

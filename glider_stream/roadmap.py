@@ -13,6 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .base.arrays import Array, Index
+from .base.settings import require
+from .base.threads import threads
 from .edges import Evaluator
 from .flow import flow_sha256
 from .glider import glider_sha256
@@ -21,11 +24,7 @@ from .kernels.edges import Status
 from .legs import Legs, legs_of
 from .neighbours import NeighbourLaw, Reachable
 from .sampling import Sampler
-from .settings import require
-from .threads import threads
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 BATCH_PAIRS = 100_000
 EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
 

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from .base.arrays import Array
+from .base.checks import FASTEST, LONGEST
+from .base.errors import InputError
+from .base.settings import from_kinds, from_table, require
+from .base.toml import to_toml
 from .cost import Cost, Energy, TravelTime, energy_from_table
-from .domain import Array, BoxDomain, GeographicDomain, Point, domain_from_table
+from .domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
-from .errors import InputError
-from .flow import FASTEST, FLOWS, LONGEST, AnalyticFlow, divergence_ratio, is_steady, sample_flow, sampling_error
+from .flow import FLOWS, AnalyticFlow, divergence_ratio, is_steady, sample_flow, sampling_error
 from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
@@ -23,9 +27,7 @@ from .ocean import OceanFlow
 from .ocean.bottom import Bottom
 from .roadmap import Problem
 from .sampling import SAMPLERS, Sampler, YoSampler
-from .settings import from_kinds, from_table, require
 from .terrain import TerrainSettings, raster_terrain
-from .toml import to_toml
 
 SECTIONS = (
     "flow",

@@ -5,14 +5,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .base.arrays import Array
 from .kernels.edges import Edge, Status
 from .path import Path
 from .thin import Hop, hops_of
-
-Array = NDArray[np.float64]
 
 REASONS = {
     Status.CURRENT_TOO_STRONG: "the current across it is stronger than the vehicle; go round, or with it",

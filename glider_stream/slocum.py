@@ -9,9 +9,9 @@ import re
 
 import numpy as np
 
+from .base.settings import require
 from .frame import wrapped
 from .path import Path
-from .settings import require
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 MOST_WAYPOINTS = 8

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
@@ -13,11 +12,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, Unwritable
-from .hdf5 import check_claim, check_links
+from .base.errors import InputError
+from .base.output import replacing
+from .base.settings import require
+from .base.untrusted import check_claim, check_links
 from .kernels.edges import Status
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, Tally
-from .settings import require
 
 Array = NDArray[Any]
 FORMAT = "glider-stream/roadmap"
@@ -73,53 +73,6 @@ class Part:
     edges: Edges | None
     wall_s: float
     threads: int
-
-
-def check_output(path: str | Path) -> None:
-    """InputError unless a file can be made at `path`: before the work, not after it."""
-    path = Path(path)
-    try:
-        path.stat()
-    except FileNotFoundError:
-        pass
-    except OSError as error:
-        raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
-    require(not path.is_dir(), f"the output {path} is a folder; name a file")
-    # a device such as /dev/null would be replaced by a file
-    require(path.is_file() or not path.exists(), f"the output {path} is no ordinary file; name another")
-    require(path.parent.is_dir(), f"the output folder {path.parent} does not exist; make it first")
-    try:
-        tempfile.TemporaryFile(dir=path.resolve().parent).close()
-    except OSError as error:
-        raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`, moved into its place when the block ends well, else removed.
-
-    What the block cannot write, as where the disk is full, is an InputError that names `path`.
-    """
-    check_output(path)
-    target = path.resolve()  # a link stays one
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        with temporary.open("rb") as whole:
-            os.fsync(whole.fileno())
-        # mkstemp makes files for their owner alone; an output is as readable as any new file
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, target)
-    except OSError as error:
-        reason = (error.strerror or "it cannot be written").lower()
-        room = "make room on its disk, or name another output"
-        raise Unwritable(f"the output {path} cannot be written whole: {reason}; {room}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 class Guarded(io.FileIO):

@@ -9,8 +9,10 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array
+from .base.settings import require
+from .base.threads import threads
 from .baselines import BASELINES
 from .bench import made_by
 from .brute_force import fastest_legs
@@ -21,10 +23,7 @@ from .query import Planner
 from .roadmap import Problem, build_roadmap
 from .sampling import SobolSampler
 from .scenario import read_scenario
-from .settings import require
-from .threads import threads
 
-Array = NDArray[np.float64]
 METHODS: dict[str, Method] = {
     "flow-map": FlowMapMethod(),
     "streamline": StreamlineMethod(16),

@@ -4,18 +4,17 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .base.arrays import Array, Index
+from .base.settings import require
 from .kernels.edges import Status
 from .legs import Attached, Legs
 from .path import Path
 from .query import End, Planner
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
-from .settings import require
 from .waypoints import SURFACE
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 BINS = 48
 """Parts of the longest time under water that are told apart; a leg's is rounded up, so the rule always holds."""
 MOST_YOS = 100

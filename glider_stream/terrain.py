@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .errors import InputError
+from .base.arrays import Array
+from .base.errors import InputError
+from .base.settings import require
 from .frame import LocalFrame
 from .kernels.terrain import Seabed
 from .ocean.bottom import Bottom
-from .settings import require
 
-Array = NDArray[np.float64]
 LAND = 0.0
 """The height [m] of what no glider may enter at any depth."""
 SIDE = 512

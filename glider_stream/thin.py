@@ -5,13 +5,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .base.arrays import Array
+from .base.settings import require
 from .kernels.edges import Edge, Status
 from .path import Path
-from .settings import require
 
-Array = NDArray[np.float64]
 Hop = tuple[Array, Array, Edge]
 
 

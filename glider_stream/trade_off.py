@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from .base.settings import require
 from .path import Path
 from .query import Blend
-from .settings import require
 
 SAME = 1e-9
 """Two paths whose times and energies differ by less, relatively, are the same point."""

@@ -6,23 +6,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from .base.arrays import Array, Index
+from .base.errors import InputError
+from .base.settings import require
+from .base.threads import in_parallel, threads
 from .edges import Evaluator
-from .errors import InputError
 from .kernels.cache import entry_point
 from .kernels.control import glide_speed
 from .kernels.flow import velocities
 from .kernels.motion import rk4_step
 from .query import check_unchanged
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
-from .settings import require
 from .store import read_roadmap
-from .threads import in_parallel, threads
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 LEGS_AT_ONCE = 10
 """Legs that DOP853 flies together: its step is the one that the most crooked of them needs."""
 EDGES_AT_ONCE = 4096

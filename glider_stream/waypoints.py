@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from .base.settings import require
 from .path import Path
-from .settings import require
 
 SURFACE = 10.0
 """A leg that ends no deeper [m] ends at the surface."""

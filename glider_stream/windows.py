@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .base.settings import require
 from .frame import wrapped
 from .path import Path
-from .settings import require
 
 HOURS = 12.0
 """A window, unless said otherwise."""

@@ -7,8 +7,8 @@ import pytest
 from small import command, strict_json
 
 from glider_stream import bench, planner
+from glider_stream.base.errors import InputError
 from glider_stream.bench import Figure, Record, read_record
-from glider_stream.errors import InputError
 
 CEILING = "#!{}\nprint('{{\"evaluations_per_s\": 5e7}}')\n"
 

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 from small import SCENARIO, command, strict_json
 from test_ocean import DATA, real
 
+from glider_stream.base.errors import InputError
 from glider_stream.calibrate import calibrate
 from glider_stream.calibration import CONFIDENCE
 from glider_stream.dives import MOST_DIVES, read_dives
-from glider_stream.errors import InputError
 from glider_stream.glider import glider_from_table, polar
 from glider_stream.scenario import scenario_from_text
 

@@ -8,8 +8,8 @@ from small import command, scenario_file
 from test_jobs import datasets
 
 from glider_stream import planner
+from glider_stream.base.errors import InputError
 from glider_stream.change import untouched
-from glider_stream.errors import InputError
 from glider_stream.scenario import read_scenario
 
 xr = pytest.importorskip("xarray")

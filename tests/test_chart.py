@@ -11,7 +11,7 @@ from small import command, roadmap
 from test_plot import arrivals, box_scene, ocean_scene
 
 from glider_stream import planner, plot
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.frame import LocalFrame
 from glider_stream.kernels.terrain import OpenWater, Seabed
 from glider_stream.path import Leg, Path

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from small import command, executable, roadmap, scenario_file, strict_json
 
-from glider_stream import progress
+from glider_stream.base import progress
 from glider_stream.cli import cli
 from glider_stream.store import read_roadmap, write_roadmap
 

@@ -9,7 +9,7 @@ from small import command, scenario_file
 from test_jobs import BATCH, METHODS, datasets, expected, problem
 
 from glider_stream import cluster
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.jobs import Job, build_file
 
 pytest.importorskip("distributed")

@@ -9,8 +9,8 @@ import pytest
 from small import command, roadmap, scenario_file, strict_json
 
 from glider_stream import planner
+from glider_stream.base.errors import InputError
 from glider_stream.cost import GRAVITY, PRESETS, Energy, TravelTime
-from glider_stream.errors import InputError
 from glider_stream.kernels.cost import edge_cost
 from glider_stream.query import Blend, Planner
 from glider_stream.roadmap import Roadmap

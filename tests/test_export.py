@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.export import ANYWHERE, EXPORTS, export_path
 from glider_stream.frame import LocalFrame
 from glider_stream.path import Leg, Path

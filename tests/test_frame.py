@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.frame import LocalFrame, eastward, wrapped
 
 pyproj = pytest.importorskip("pyproj")

@@ -6,7 +6,7 @@ from math import cos, radians, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.glider import (
     POLAR_TOLERANCE,
     PRESETS,

@@ -20,10 +20,10 @@ from small import SCENARIO, roadmap, scenario_file
 from test_jobs import interrupt, problem
 
 from glider_stream import planner
+from glider_stream.base.errors import InputError, Stopped
 from glider_stream.calibrate import calibrate
 from glider_stream.dives import read_dives
 from glider_stream.drawn import read_drawn
-from glider_stream.errors import InputError, Stopped
 from glider_stream.frame import LocalFrame
 from glider_stream.jobs import Job, Shard, build_file, merge
 from glider_stream.ocean.bathymetry import read_bathymetry

@@ -17,7 +17,7 @@ import pytest
 from small import command, executable, scenario_file
 
 from glider_stream import jobs, journal, planner, roadmap, store
-from glider_stream.errors import InputError, Stopped
+from glider_stream.base.errors import InputError, Stopped
 from glider_stream.jobs import Job, Shard, build_file, merge, shard_of
 from glider_stream.kernels.edges import Status
 from glider_stream.roadmap import Edges, build_roadmap, find_edges, in_order
@@ -204,7 +204,7 @@ def test_a_damaged_journal_is_cut_where_it_is_whole(place):
 def test_two_builds_at_once(place):
     path = (place / "road.h5").resolve()
     hold = "with locked(Path(sys.argv[1])): print('held', flush=True); sys.stdin.read()"
-    code = f"import sys; from pathlib import Path; from glider_stream.lock import locked\n{hold}"
+    code = f"import sys; from pathlib import Path; from glider_stream.base.lock import locked\n{hold}"
     with subprocess.Popen(
         [sys.executable, "-c", code, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as first:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.neighbours import AllNodes, Nearest, Radius, as_csr
 
 VOLUME = 600.0 * 600.0 * 300.0

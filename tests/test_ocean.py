@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glider_stream.base.errors import InputError
 from glider_stream.describe import describe
-from glider_stream.errors import InputError
 from glider_stream.frame import LocalFrame
 from glider_stream.kernels.flow import contains, velocity
 from glider_stream.kernels.terrain import allowed

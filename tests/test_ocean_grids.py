@@ -9,7 +9,7 @@ import warnings
 import numpy as np
 import pytest
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.frame import LocalFrame
 from glider_stream.kernels.flow import velocity
 from glider_stream.ocean import divergence_ratio, ocean_flow, read_currents, sample

@@ -13,9 +13,9 @@ from small import command, roadmap, scenario_file, strict_json
 from test_export import DEPARTS, FRAME, STOPS, route
 
 from glider_stream import planner
+from glider_stream.base.errors import InputError
 from glider_stream.card import card
 from glider_stream.drawn import read_drawn
-from glider_stream.errors import InputError
 from glider_stream.export import export_path
 from glider_stream.frame import LocalFrame
 from glider_stream.kernels.edges import Edge, Status

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from small import SCENARIO
 
 from glider_stream import plot
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.kernels.flow import OceanGrid, Vortices, velocity
 from glider_stream.kernels.terrain import OpenWater, Seabed, allowed
 from glider_stream.path import Leg, Path

@@ -8,7 +8,7 @@ import pytest
 from small import SCENARIO, TOLERANCE, K, distance, roadmap, scenario_file, strict_json
 
 from glider_stream import planner
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.export import EXPORTS
 from glider_stream.kernels.edges import Status
 from glider_stream.path import load_path

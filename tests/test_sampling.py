@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.sampling import SAMPLERS, GridSampler, HaltonSampler, RandomSampler, SobolSampler, YoSampler
 
 LO, HI = np.array([-300.0, 50.0, -200.0]), np.array([100.0, 250.0, 0.0])

@@ -13,9 +13,9 @@ from small import SCENARIO, command, roadmap, strict_json
 from test_export import FRAME, STOPS, route
 
 from glider_stream import planner
+from glider_stream.base.errors import InputError
 from glider_stream.drawn import FORMS, MOST_TEXT, read_drawn
 from glider_stream.edges import SurfaceMethod
-from glider_stream.errors import InputError
 from glider_stream.export import export_path
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.query import Planner

@@ -7,7 +7,7 @@ import pytest
 from small import command, roadmap, scenario_file, strict_json
 from test_cost import random_roadmap
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.query import Planner
 from glider_stream.scenario import read_scenario
 from glider_stream.surfacing import BINS, Surfacing, SurfacingPlanner

@@ -10,7 +10,7 @@ from scipy.interpolate import RegularGridInterpolator
 from small import command
 from test_ocean import DATA, real
 
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.frame import LocalFrame
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.kernels.terrain import allowed

@@ -12,7 +12,7 @@ from small import TOLERANCE, command, roadmap, strict_json
 from test_export import route
 
 from glider_stream import planner
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.query import Planner
 from glider_stream.scenario import scenario_from_text

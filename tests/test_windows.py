@@ -12,7 +12,7 @@ from small import command, roadmap, strict_json
 from test_export import FRAME, STOPS, route
 
 from glider_stream import planner
-from glider_stream.errors import InputError
+from glider_stream.base.errors import InputError
 from glider_stream.export import export_path
 from glider_stream.frame import LocalFrame
 from glider_stream.query import Planner

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
 from ..frame import wrapped
-from ..settings import require
 from .names import WORDS, Names, standard_name
 from .units import in_metres
 
-Array = NDArray[np.float64]
 MOST_POINTS = 100_000_000
 """Places of a curved grid that are looked at."""
 

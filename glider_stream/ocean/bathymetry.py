@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..frame import LocalFrame, Range
-from ..settings import require
+from ..base.arrays import Array
+from ..base.checks import Range
+from ..base.errors import InputError
+from ..base.settings import require
+from ..frame import LocalFrame
 from .axes import degrees, places
 from .bottom import Bottom
 from .grid import Grid, grid_of
@@ -18,8 +19,6 @@ from .horizontal import horizontal_of
 from .names import Catalogue, Names, listing, standard_name
 from .opening import opened
 from .units import in_metres
-
-Array = NDArray[np.float64]
 
 UP_NAMES = re.compile(
     r"^(height_above_(reference_ellipsoid|mean_sea_level|geopotential_datum)|(surface|bedrock|ground_level)_altitude"

@@ -1,12 +1,10 @@
 """How far a current is from one that a stream function has."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Array
 from .file import OceanFile
 from .grid import EARTH, unit_vectors
-
-Array = NDArray[np.float64]
 
 
 def _central(values: Array, axis: int) -> Array:

@@ -6,11 +6,10 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..base.arrays import Array, Bools
+from ..base.errors import InputError
 from .grid import Grid
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Times = NDArray[np.datetime64]
 
 

@@ -6,17 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from ..frame import MAX_SCALE_ERROR, LocalFrame, Range
+from ..base.arrays import Array, Bools
+from ..base.checks import Range
+from ..base.errors import InputError
+from ..base.settings import require
+from ..frame import MAX_SCALE_ERROR, LocalFrame
 from ..kernels.flow import OceanGrid, velocities
 from ..kernels.terrain import Seabed, allowed
-from ..settings import require
 from .bottom import Bottom
 from .file import OceanFile, parse_time
 from .grid import EVEN, Grid, IndexMap, index_map, span
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 MARGIN = 2
 """Cells kept around a domain: paths may stray."""

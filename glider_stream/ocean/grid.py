@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..frame import LocalFrame, Range, eastward, wrapped
-from ..settings import require
+from ..base.arrays import Array
+from ..base.checks import Range
+from ..base.settings import require
+from ..frame import LocalFrame, eastward, wrapped
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 EARTH = 6_371_000.0

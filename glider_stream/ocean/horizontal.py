@@ -4,13 +4,11 @@ import re
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..settings import require
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
 from .names import WORDS, Catalogue, standard_name
-
-Array = NDArray[np.float64]
 
 
 def horizontal_of(at: Catalogue, variable: Any, component: str) -> tuple[tuple[str, str], Any, Any]:

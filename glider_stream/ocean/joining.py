@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..errors import InputError
-from ..settings import require
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
 from .file import OceanFile
 from .grid import Grid, grid_of, unit_vectors
 from .land import mark_land
@@ -18,7 +19,6 @@ from .names import WORDS, Names
 from .part import Field, Part
 from .stagger import AGREES, collocated, half_a_cell_on, row_angle, same_points, turned
 
-Array = NDArray[np.float64]
 Values = NDArray[np.float32]
 LITTLE = math.radians(0.1)
 """A grid turned by less [rad] reads the same either way: 0.5 mm/s in 0.3 m/s."""

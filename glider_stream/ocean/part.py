@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from ..base.arrays import Array
 from .grid import Grid, unit_vectors
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..frame import Range, wrapped
-from ..settings import from_table, require
+from ..base.arrays import Array, Bools
+from ..base.checks import Range
+from ..base.errors import InputError
+from ..base.settings import from_table, require
+from ..frame import wrapped
 from .axes import degrees, depths, places, times
 from .file import OceanFile
 from .flow import HALO, MARGIN, levels_for
@@ -34,8 +36,6 @@ from .part import Field, Part
 from .sigma import fixed_depths, sigma_levels, to_fixed
 from .units import in_metres_per_second
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Values = NDArray[np.float32]
 Domain = tuple[Range, Range, Range]
 

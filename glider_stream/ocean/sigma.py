@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..settings import require
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
 from .names import SIGMA, listing, standard_name
 
-Array = NDArray[np.float64]
 Values = NDArray[np.float32]
 FINER = 2
 """Levels of fixed depth for each terrain-following one: interpolating twice must not blur."""

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from ..base.arrays import Array
+from ..base.settings import require
 from ..frame import wrapped
-from ..settings import require
 from .grid import unit_vectors
 
-Array = NDArray[np.float64]
 Values = NDArray[np.float32]
 MATCHES = 0.1
 """Points this close, in cells, are the same."""

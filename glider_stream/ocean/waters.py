@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from ..frame import LocalFrame, Range
+from ..base.checks import Range
+from ..frame import LocalFrame
 from ..kernels.flow import OceanGrid
 from .bottom import Bottom
 from .flow import ocean_waters

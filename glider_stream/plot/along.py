@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Array
 from ..path import Path
 from ..query import true_north
 
 if TYPE_CHECKING:
     from ..roadmap import Problem
 
-Array = NDArray[np.float64]
 SHORTEST = 1e-3
 """A step [s] below it is the rest that integration leaves: a speed over it would be noise."""
 

@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..settings import require
-from ..store import check_output, replacing
+from ..base.errors import InputError
+from ..base.output import check_output, replacing
+from ..base.settings import require
 
 if TYPE_CHECKING:
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 Side = tuple[float, float]
 
 INK, GREY = "#1a1a1a", "#9a9a9a"

@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.arrays import Array
+from ..base.settings import require
 from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
-from ..settings import require
 from .along import Along, along
-from .canvas import GREY, INK, Array, colours, frozen, new_figure, said_time, styled, time_unit
+from .canvas import GREY, INK, colours, frozen, new_figure, said_time, styled, time_unit
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
 from .seabed import known_until, sample_bottom

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Array
+from ..base.settings import require
 from ..kernels.terrain import Terrain
-from ..settings import require
-from .canvas import Array
 from .seabed import without_clearance
 from .water import Frame, sample_water
 

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .canvas import INK, Array
+from ..base.arrays import Array
+from .canvas import INK
 from .water import Frame
 
 if TYPE_CHECKING:

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.arrays import Array
+from ..base.output import replacing
+from ..base.settings import require
 from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
-from ..settings import require
-from ..store import replacing
 from .along import along
-from .canvas import Array, length_unit, said_time, thinned, time_unit
+from .canvas import length_unit, said_time, thinned, time_unit
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import known_until, sample_bottom

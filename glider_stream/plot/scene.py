@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.arrays import Array
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
-from .canvas import GREY, INK, Array, colours, thinned
+from .canvas import GREY, INK, colours, thinned
 from .graticule import draw_graticule
 from .seabed import without_clearance
 from .water import Frame, sample_field, sample_water

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.arrays import Array
 from ..kernels.flow import Flow
 from ..kernels.terrain import Seabed, Terrain
-from .canvas import Array
 from .water import sample_water
 
 DEEPEST = -12000.0

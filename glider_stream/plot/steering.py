@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from scipy.optimize import root
 
+from ..base.arrays import Array
 from ..edges import Evaluator, FlowMapMethod, Method, StreamlineMethod
 from ..kernels.control import CLIMB, DIVE
 from ..kernels.edges import Status
 from ..neighbours import AllNodes, as_csr
-from .canvas import GREY, INK, Array, colours, frozen, new_figure, styled, thinned, time_unit
+from .canvas import GREY, INK, colours, frozen, new_figure, styled, thinned, time_unit
 from .scene import draw_current
 from .water import Frame, frame_of
 

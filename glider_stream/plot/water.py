@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import Array
+from ..base.settings import require
 from ..kernels.cache import entry_point
 from ..kernels.flow import Flow, contains, velocity
 from ..kernels.terrain import Terrain, allowed
-from ..settings import require
-from .canvas import Array, Side, length_unit
+from .canvas import Side, length_unit
 
 if TYPE_CHECKING:
     from ..roadmap import Problem

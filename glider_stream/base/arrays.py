@@ -1,0 +1,11 @@
+"""Types of arrays, by what they hold."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+"""Real numbers."""
+Index = NDArray[np.int64]
+"""Numbers of nodes, of edges, of rows."""
+Bools = NDArray[np.bool_]
+"""Choices among rows."""

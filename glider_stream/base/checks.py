@@ -1,0 +1,26 @@
+"""Bounds that hold in every scenario, and the checks that name what breaks them."""
+
+from .settings import require
+
+Range = tuple[float, float]
+
+LONGEST = 1e9
+"""The longest time [s] that a scenario may speak of: beyond, clocks lose their microseconds."""
+
+WIDEST = 1e9
+"""Longest side of a box [m]."""
+
+FASTEST = 100.0
+"""Greatest current [m/s] that is taken for one."""
+
+
+def check_range(bounds: Range, where: str) -> None:
+    """InputError unless lo < hi."""
+    require(bounds[0] < bounds[1], f"`{where}` must rise; got [{bounds[0]:g}, {bounds[1]:g}]")
+    wide = bounds[1] - bounds[0] > WIDEST
+    require(not wide, f"`{where}` must span {WIDEST:g} at most; got [{bounds[0]:g}, {bounds[1]:g}]")
+
+
+def require_positive(value: float, where: str) -> None:
+    """InputError unless the value is above zero."""
+    require(value > 0, f"`{where}` must be above 0; got {value:g}")
