@@ -58,11 +58,11 @@ from scipy.optimize import minimize
 
 from glider_stream.base.errors import InputError
 from glider_stream.base.settings import require
-from glider_stream.flow import is_steady
 from glider_stream.kernels.flow import velocities
 from glider_stream.kernels.motion import rk4_step
 from glider_stream.roadmap import Problem
 from glider_stream.scenario import read_scenario
+from glider_stream.water.inspect import is_steady
 
 GRIDS = ("51,51,31", "101,101,61", "201,201,61")
 TAUS = (40, 60, 80, 100)

@@ -24,7 +24,6 @@ from .base.output import replacing
 from .base.settings import require
 from .base.threads import in_parallel, threads
 from .base.toml import to_toml
-from .flow import sample_flow
 from .kernels.cache import KERNEL_DIGEST, entry_point
 from .kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
 from .kernels.motion import LANES, X, Y
@@ -32,6 +31,7 @@ from .query import Planner
 from .roadmap import find_edges, node_positions, warm_up
 from .scenario import read_scenario, scenario_from_text
 from .store import read_roadmap
+from .water.sampled import sample_flow
 
 STEPS, FLIGHTS, AT_ONCE = 60, 16_384, 256
 """RK4 steps of a flight of the raw integrator, flights in batches of LANES, batches a thread takes at once."""

@@ -13,10 +13,10 @@ from .base.settings import require
 from .base.threads import in_parallel
 from .bins import node_bins
 from .cost import Cost, TravelTime
-from .flow import is_steady
 from .kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
+from .water.inspect import is_steady
 
 MAX_CANDIDATES = 1_000_000
 NODES_AT_ONCE = 16

@@ -16,10 +16,10 @@ from xml.etree import ElementTree as Xml
 
 from .base.output import check_output, replacing
 from .base.settings import require
-from .frame import wrapped
 from .path import Leg, Path
 from .seaglider import targets
 from .slocum import list_number, mission_files
+from .water.frame import wrapped
 from .windows import HOURS, Window, windows
 
 Texts = dict[str, str]

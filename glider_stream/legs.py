@@ -7,8 +7,8 @@ import numpy as np
 
 from .base.arrays import Array, Index
 from .edges import Evaluator, FlowMapMethod
-from .flow import is_steady
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
+from .water.inspect import is_steady
 
 SAMPLED = 16
 """Nodes whose pairs are counted before any work is cut."""

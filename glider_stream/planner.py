@@ -15,7 +15,6 @@ from .base.settings import require
 from .card import Card
 from .card import card as card_of
 from .difference import Difference, difference
-from .domain import GeographicDomain, Point
 from .drawn import read_drawn
 from .export import check_export, export_path
 from .jobs import Job, build_file, shard_of
@@ -31,6 +30,7 @@ from .surfacing import Surfacing, SurfacingPlanner
 from .thin import thin as thinned
 from .trade_off import TradeOff
 from .trade_off import trade_off as find_trade_off
+from .water.domain import GeographicDomain, Point
 from .waypoints import SURFACE
 from .windows import HOURS
 
@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 
     from .bench import Record
     from .calibration import Calibration
-    from .describe import Description, Place
-    from .ocean import Names
     from .suite import Report
     from .verify import Verification
+    from .water.describe import Description, Place
+    from .water.ocean import Names
 
 
 def build(
@@ -356,7 +356,7 @@ def describe(
     A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None where there is but one.
     `names` says what the files do not. InputError where they cannot be used.
     """
-    from .describe import describe
+    from .water.describe import describe
 
     return describe(currents, at, names)
 

@@ -1,7 +1,7 @@
 """Queries: Dijkstra over a roadmap, a start and a goal attached to it."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,12 +13,13 @@ from scipy.sparse.csgraph import dijkstra
 
 from .base.arrays import Array, Index
 from .base.settings import require
-from .flow import flow_sha256
 from .glider import glider_sha256
 from .kernels.edges import Edge, Status
 from .legs import Attached, Legs
 from .path import Leg, Path
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
+from .water.frame import true_north
+from .water.inspect import flow_sha256
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
@@ -341,13 +342,6 @@ class Planner:
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
-
-
-def true_north(to_lonlat: Callable[[Array], Array], point: Array) -> float:
-    """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
-    ends = to_lonlat(np.stack([point, point + np.array([0.0, 1.0, 0.0])]))
-    east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
-    return math.atan2(east, north)
 
 
 def _connected(attached: Attached) -> Attached:

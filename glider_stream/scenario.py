@@ -16,18 +16,20 @@ from .base.errors import InputError
 from .base.settings import from_kinds, from_table, require
 from .base.toml import to_toml
 from .cost import Cost, Energy, TravelTime, energy_from_table
-from .domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
-from .flow import FLOWS, AnalyticFlow, divergence_ratio, is_steady, sample_flow, sampling_error
 from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
 from .neighbours import NEIGHBOURS, NeighbourLaw, Reachable
-from .ocean import OceanFlow
-from .ocean.bottom import Bottom
 from .roadmap import Problem
 from .sampling import SAMPLERS, Sampler, YoSampler
-from .terrain import TerrainSettings, raster_terrain
+from .water.analytic import FLOWS, AnalyticFlow
+from .water.domain import BoxDomain, GeographicDomain, Point, domain_from_table
+from .water.inspect import divergence_ratio, is_steady
+from .water.ocean import OceanFlow
+from .water.ocean.bottom import Bottom
+from .water.sampled import sample_flow, sampling_error
+from .water.terrain import TerrainSettings, raster_terrain
 
 SECTIONS = (
     "flow",
@@ -184,7 +186,7 @@ class Scenario:
         assert isinstance(self.domain, GeographicDomain)
         domain, frame, asked = self.domain, self.domain.frame(), self.terrain
         if asked.bathymetry is not None:
-            from .ocean.bathymetry import read_bathymetry
+            from .water.ocean.bathymetry import read_bathymetry
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))

@@ -1,8 +1,8 @@
 """Seaglider's `targets` file: a route's waypoints, each naming the next."""
 
 from .base.settings import require
-from .frame import wrapped
 from .path import Path
+from .water.frame import wrapped
 from .waypoints import degrees_and_minutes, waypoints
 
 RADIUS = 200

@@ -10,8 +10,8 @@ import re
 import numpy as np
 
 from .base.settings import require
-from .frame import wrapped
 from .path import Path
+from .water.frame import wrapped
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 MOST_WAYPOINTS = 8

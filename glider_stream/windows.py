@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .base.settings import require
-from .frame import wrapped
 from .path import Path
+from .water.frame import wrapped
 
 HOURS = 12.0
 """A window, unless said otherwise."""

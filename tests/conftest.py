@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from glider_stream.edges import Evaluator, IntegrationSettings, StreamlineMethod
-from glider_stream.flow import DoubleGyre, Jet, Rankine, Uniform, Vortex, Vortices, sample_flow
 from glider_stream.glider import PRESETS, polar
 from glider_stream.kernels.flow import OceanGrid
 from glider_stream.kernels.terrain import OpenWater
+from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, Uniform, Vortex, Vortices
+from glider_stream.water.sampled import sample_flow
 
 HEIGHTS = (-250.0, 0.0)
 FIVE = (

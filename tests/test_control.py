@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from glider_stream.flow import Uniform
 from glider_stream.kernels.control import (
     CLIMB,
     DIVE,
@@ -22,6 +21,7 @@ from glider_stream.kernels.control import (
     vertical_speed,
 )
 from glider_stream.kernels.flow import mean_velocity
+from glider_stream.water.analytic import Uniform
 
 SLOWEST = 0.1
 

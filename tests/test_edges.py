@@ -11,7 +11,6 @@ import reference
 from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
 from glider_stream.edges import IntegrationSettings, StreamlineMethod, SurfaceMethod
-from glider_stream.flow import Uniform, Vortex, Vortices, sample_flow
 from glider_stream.kernels.connect import connect_nodes
 from glider_stream.kernels.control import (
     CLIMB,
@@ -29,6 +28,8 @@ from glider_stream.neighbours import Nearest
 from glider_stream.query import Planner
 from glider_stream.roadmap import EDGE_FIELDS, Problem, build_roadmap
 from glider_stream.sampling import RandomSampler
+from glider_stream.water.analytic import Uniform, Vortex, Vortices
+from glider_stream.water.sampled import sample_flow
 
 both_methods = pytest.mark.parametrize("method", [StreamlineMethod, SurfaceMethod])
 METRES = 1e-9

@@ -11,19 +11,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from glider_stream.flow import (
-    DoubleGyre,
-    Jet,
-    Rankine,
-    SingleGyre,
-    Uniform,
-    Vortex,
-    Vortices,
-    divergence_ratio,
-    sample_flow,
-)
 from glider_stream.kernels.flow import Flow, Grid, contains, mean_velocity, velocities, velocity
 from glider_stream.scenario import read_scenario
+from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, SingleGyre, Uniform, Vortex, Vortices
+from glider_stream.water.inspect import divergence_ratio
+from glider_stream.water.sampled import sample_flow
 
 HEIGHTS = (-250.0, 0.0)
 KINDS = ("uniform", "vortices", "gyre", "rankine", "jet", "grid", "ocean")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glider_stream.base.errors import InputError
-from glider_stream.frame import LocalFrame, eastward, wrapped
+from glider_stream.water.frame import LocalFrame, eastward, wrapped
 
 pyproj = pytest.importorskip("pyproj")
 GEOD = pyproj.Geod(ellps="WGS84")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.flow import Rankine, Uniform
 from glider_stream.kernels.control import DIVE, control_towards
 from glider_stream.kernels.motion import Integration, along_segment, arrival_window, closest_approach, traced
+from glider_stream.water.analytic import Rankine, Uniform
 
 HEIGHTS = (-250.0, 0.0)
 GLIDES = [(0.35, -2.0), (0.45, 0.4), (0.6, 1.9), (0.3, 3.0)]

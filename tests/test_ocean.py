@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from glider_stream.base.errors import InputError
-from glider_stream.describe import describe
-from glider_stream.frame import LocalFrame
 from glider_stream.kernels.flow import contains, velocity
 from glider_stream.kernels.terrain import allowed
-from glider_stream.ocean import (
+from glider_stream.water.describe import describe
+from glider_stream.water.frame import LocalFrame
+from glider_stream.water.ocean import (
     Names,
     OceanFlow,
     divergence_ratio,
@@ -23,8 +23,8 @@ from glider_stream.ocean import (
     read_currents,
     sample,
 )
-from glider_stream.ocean.flow import bottoms, filled, lower_faces, slots
-from glider_stream.ocean.grid import MAP_ERROR, LonLatGrid, index_map
+from glider_stream.water.ocean.flow import bottoms, filled, lower_faces, slots
+from glider_stream.water.ocean.grid import MAP_ERROR, LonLatGrid, index_map
 
 xr = pytest.importorskip("xarray")
 pyproj = pytest.importorskip("pyproj")

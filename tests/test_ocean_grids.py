@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from glider_stream.base.errors import InputError
-from glider_stream.frame import LocalFrame
 from glider_stream.kernels.flow import velocity
-from glider_stream.ocean import divergence_ratio, ocean_flow, read_currents, sample
+from glider_stream.water.frame import LocalFrame
+from glider_stream.water.ocean import divergence_ratio, ocean_flow, read_currents, sample
 
 xr = pytest.importorskip("xarray")
 pyproj = pytest.importorskip("pyproj")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import reference
 
-from glider_stream.flow import Uniform
 from glider_stream.kernels.stream import stream_value
+from glider_stream.water.analytic import Uniform
 
 
 def pairs(count, seed, heights=(-250.0, 0.0)):

@@ -11,14 +11,14 @@ from small import command
 from test_ocean import DATA, real
 
 from glider_stream.base.errors import InputError
-from glider_stream.frame import LocalFrame
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.kernels.terrain import allowed
-from glider_stream.ocean.bathymetry import read_bathymetry
 from glider_stream.plot.water import sample_water
 from glider_stream.roadmap import build_roadmap, node_positions
 from glider_stream.scenario import read_scenario
-from glider_stream.terrain import TerrainSettings, raster_terrain, read_polygons
+from glider_stream.water.frame import LocalFrame
+from glider_stream.water.ocean.bathymetry import read_bathymetry
+from glider_stream.water.terrain import TerrainSettings, raster_terrain, read_polygons
 
 xr = pytest.importorskip("xarray")
 shapely = pytest.importorskip("shapely")

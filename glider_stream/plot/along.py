@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..path import Path
-from ..query import true_north
+from ..water.frame import true_north
 
 if TYPE_CHECKING:
     from ..roadmap import Problem

@@ -7,9 +7,9 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
-from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..water.inspect import is_steady
 from .along import Along, along
 from .canvas import GREY, INK, colours, frozen, new_figure, said_time, styled, time_unit
 from .fronts import Fronts, draw_fronts

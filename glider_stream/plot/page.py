@@ -18,9 +18,9 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.output import replacing
 from ..base.settings import require
-from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..water.inspect import is_steady
 from .along import along
 from .canvas import length_unit, said_time, thinned, time_unit
 from .fronts import HOUR, Fronts, front_times

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..water.inspect import is_steady
 from .canvas import INK, colours, frozen, new_figure, said_time, styled, thinned, time_unit
 from .scene import MAX_NODES, draw_current, draw_space
 from .water import Frame, checked_depths, frame_of

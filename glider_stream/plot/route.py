@@ -7,9 +7,9 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
-from ..flow import is_steady
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..water.inspect import is_steady
 from .canvas import GREY, INK, colours, frozen, new_figure, said_time, styled, time_unit
 from .scene import draw_current, draw_ends, draw_space, stretch
 from .water import Frame, checked_depths, frame_of, sample_field

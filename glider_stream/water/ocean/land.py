@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.settings import require
+from ...base.settings import require
 from .names import Names, standard_name
 
 Values = NDArray[np.float32]

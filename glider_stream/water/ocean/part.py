@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..base.arrays import Array
+from ...base.arrays import Array
 from .grid import Grid, unit_vectors
 
 

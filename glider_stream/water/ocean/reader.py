@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Bools
-from ..base.checks import Range
-from ..base.errors import InputError
-from ..base.settings import from_table, require
+from ...base.arrays import Array, Bools
+from ...base.checks import Range
+from ...base.errors import InputError
+from ...base.settings import from_table, require
 from ..frame import wrapped
 from .axes import degrees, depths, places, times
 from .file import OceanFile

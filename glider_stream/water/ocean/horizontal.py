@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
 from .names import WORDS, Catalogue, standard_name
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
 from .names import SIGMA, listing, standard_name
 
 Values = NDArray[np.float32]

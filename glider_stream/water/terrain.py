@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.errors import InputError
-from .base.settings import require
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
+from ..kernels.terrain import Seabed
 from .frame import LocalFrame
-from .kernels.terrain import Seabed
 from .ocean.bottom import Bottom
 
 LAND = 0.0

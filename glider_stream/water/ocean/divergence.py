@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..base.arrays import Array
+from ...base.arrays import Array
 from .file import OceanFile
 from .grid import EARTH, unit_vectors
 

@@ -1,6 +1,7 @@
 """The local frame: metres about a centre on the globe, x east and y north there."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -8,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base.arrays import Array
-from .base.checks import Range
-from .base.errors import InputError
-from .base.settings import require
+from ..base.arrays import Array
+from ..base.checks import Range
+from ..base.errors import InputError
+from ..base.settings import require
 
 MAX_SCALE_ERROR = 0.01
 """Beyond this the frame's metres are no longer metres: some 2500 km from side to side."""
@@ -90,3 +91,10 @@ class LocalFrame:
         return _projection(self.lon, self.lat).get_factors(
             wrapped(lon, self.lon), np.asarray(lat, dtype=np.float64)
         )
+
+
+def true_north(to_lonlat: Callable[[Array], Array], point: Array) -> float:
+    """True north [rad], counter-clockwise from the frame's +y: which way a metre along it goes."""
+    ends = to_lonlat(np.stack([point, point + np.array([0.0, 1.0, 0.0])]))
+    east, north = (ends[1] - ends[0]) * [math.cos(math.radians(ends[0, 1])), 1.0]
+    return math.atan2(east, north)

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Array, Bools
-from ..base.checks import Range
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.arrays import Array, Bools
+from ...base.checks import Range
+from ...base.errors import InputError
+from ...base.settings import require
+from ...kernels.flow import OceanGrid, velocities
+from ...kernels.terrain import Seabed, allowed
 from ..frame import MAX_SCALE_ERROR, LocalFrame
-from ..kernels.flow import OceanGrid, velocities
-from ..kernels.terrain import Seabed, allowed
 from .bottom import Bottom
 from .file import OceanFile, parse_time
 from .grid import EVEN, Grid, IndexMap, index_map, span

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
 from ..frame import wrapped
 from .names import WORDS, Names, standard_name
 from .units import in_metres

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Bools
-from ..base.errors import InputError
+from ...base.arrays import Array, Bools
+from ...base.errors import InputError
 from .grid import Grid
 
 Times = NDArray[np.datetime64]

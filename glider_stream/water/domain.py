@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.checks import Range, check_range
-from .base.settings import from_table, require
+from ..base.arrays import Array
+from ..base.checks import Range, check_range
+from ..base.settings import from_table, require
 
 if TYPE_CHECKING:
     from .frame import LocalFrame

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..base.arrays import Array
-from ..base.checks import Range
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.checks import Range
+from ...base.settings import require
 from ..frame import LocalFrame, eastward, wrapped
 
 Index = NDArray[np.intp]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
 from .file import OceanFile
 from .grid import Grid, grid_of, unit_vectors
 from .land import mark_land

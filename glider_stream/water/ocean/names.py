@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.errors import InputError
+from ...base.settings import require
 from .units import in_metres_per_second
 
 STANDARD_NAMES = [

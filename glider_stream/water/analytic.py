@@ -1,28 +1,20 @@
 """Flows of a scenario: analytic fields, checked and turned into what the kernels read."""
 
-import hashlib
 import itertools
 import math
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.checks import Range, check_range, require_positive
-from .base.settings import require
-from .base.threads import in_parallel
-from .kernels import flow as kernel
-from .kernels.terrain import Terrain
+from ..base.arrays import Array
+from ..base.checks import Range, check_range, require_positive
+from ..base.settings import require
+from ..kernels import flow as kernel
 
 ALWAYS = (-math.inf, math.inf)
 BEYOND = 50.0
 """How far [m] a path may pass the depths of the domain: the bound of the speed holds there too."""
-LINES_AT_ONCE = 8
-"""Lines of a sampled grid that a thread takes at once."""
-MAX_SAMPLES = 100_000_000
-"""Largest grid [points] that `sampled` makes: 1.6 GB."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,87 +244,3 @@ FLOWS: dict[str, type[AnalyticFlow]] = {
     "rankine": Rankine,
     "jet": Jet,
 }
-
-
-def is_steady(flow: kernel.Flow) -> bool:
-    """Whether the flow is the same at all times."""
-    if isinstance(flow, kernel.Gyre):
-        return flow.epsilon == 0
-    return math.isinf(flow.t_lo)
-
-
-def sample_flow(
-    flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range
-) -> kernel.Grid:
-    """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
-    require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
-    box = [(max(x[0], flow.x_lo), min(x[1], flow.x_hi)), (max(y[0], flow.y_lo), min(y[1], flow.y_hi)), z]
-    points = [(float(hi) - float(lo)) / step + 1 for (lo, hi), step in zip(box, spacing, strict=True)]
-    require(
-        math.prod(points) <= MAX_SAMPLES,
-        f"`flow.sampled` = {list(spacing)} makes {math.prod(points):.3g} points, "
-        f"more than {MAX_SAMPLES:,}; widen it",
-    )
-    counts = [max(2, math.ceil(n - 1e-9)) for n in points]
-    lines = [np.linspace(lo, hi, n) for (lo, hi), n in zip(box, counts, strict=True)]
-    values = np.empty((counts[2], counts[0], counts[1], 2))
-    in_parallel(partial(kernel.sample_lines, flow, *lines, 0.0, values), counts[2] * counts[0], LINES_AT_ONCE)
-    steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
-    level_speed = np.array([np.hypot(level[..., 0], level[..., 1]).max() for level in values])
-    return kernel.Grid(
-        values=values,
-        level_speed=level_speed,
-        level_carry=np.concatenate([[0.0], np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 * steps[2])]),
-        per_x=1 / steps[0],
-        per_y=1 / steps[1],
-        z_first=z[0],
-        per_z=1 / steps[2],
-        x_lo=box[0][0],
-        x_hi=box[0][1],
-        y_lo=box[1][0],
-        y_hi=box[1][1],
-        t_lo=flow.t_lo,
-        t_hi=flow.t_hi,
-        max_speed=float(level_speed.max()),
-        length_scale=max(flow.length_scale / 2, steps[0], steps[1])
-        if math.isfinite(flow.length_scale)
-        else steps[0],
-    )
-
-
-def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, z: Range) -> float:
-    """The most [m/s] that a flow read on a grid is off, at 4096 points of a box [m]."""
-    lo, hi = np.array([x, y, z]).T
-    px, py, pz = (lo + np.random.default_rng(0).random((4096, 3)) * (hi - lo)).T.copy()
-    now = np.zeros(px.size)
-    off = kernel.velocities(flow, px, py, pz, now) - kernel.velocities(sampled, px, py, pz, now)
-    return float(np.hypot(off[:, 0], off[:, 1]).max())
-
-
-def flow_sha256(flow: kernel.Flow | Terrain) -> str:
-    """A digest of everything the kernels can read of a flow, or of a terrain."""
-    text = hashlib.sha256(type(flow).__name__.encode())
-    for name, value in zip(flow._fields, flow, strict=True):
-        array = np.ascontiguousarray(value)
-        text.update(f"\n{name} {array.dtype} {array.shape}\n".encode() + array.tobytes())
-    return text.hexdigest()
-
-
-def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096) -> float:
-    """Rms horizontal divergence over rms vorticity in a box [m]; the stream value needs it small.
-
-    0 where the flow has neither; inf where it only diverges.
-    """
-    step = 1e-3 * min(flow.length_scale, x[1] - x[0], y[1] - y[0])
-    share = np.random.default_rng(0).random((3, count))
-    lo = np.array([x[0] + step, y[0] + step, z[0]])
-    hi = np.array([x[1] - step, y[1] - step, z[1]])
-    px, py, pz = lo[:, None] + share * (hi - lo)[:, None]
-    when = np.full(count, t)
-    by_x = kernel.velocities(flow, px + step, py, pz, when) - kernel.velocities(flow, px - step, py, pz, when)
-    by_y = kernel.velocities(flow, px, py + step, pz, when) - kernel.velocities(flow, px, py - step, pz, when)
-    divergence = float(np.sqrt(np.mean((by_x[:, 0] + by_y[:, 1]) ** 2)))
-    vorticity = float(np.sqrt(np.mean((by_x[:, 1] - by_y[:, 0]) ** 2)))
-    if divergence == 0:
-        return 0.0
-    return divergence / vorticity if vorticity > 0 else math.inf

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from ..base.checks import Range
+from ...base.checks import Range
+from ...kernels.flow import OceanGrid
 from ..frame import LocalFrame
-from ..kernels.flow import OceanGrid
 from .bottom import Bottom
 from .flow import ocean_waters
 from .names import Names

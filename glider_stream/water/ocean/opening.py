@@ -8,9 +8,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import InputError
-from ..base.settings import require
-from ..base.untrusted import check_claim, check_links
+from ...base.errors import InputError
+from ...base.settings import require
+from ...base.untrusted import check_claim, check_links
 
 MOST_STORE_FILES = 100_000
 """Files of a Zarr store that are looked at."""

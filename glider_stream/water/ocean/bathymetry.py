@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.checks import Range
-from ..base.errors import InputError
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.checks import Range
+from ...base.errors import InputError
+from ...base.settings import require
 from ..frame import LocalFrame
 from .axes import degrees, places
 from .bottom import Bottom

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..base.arrays import Array
-from ..base.settings import require
+from ...base.arrays import Array
+from ...base.settings import require
 from ..frame import wrapped
 from .grid import unit_vectors
 

@@ -1,0 +1,46 @@
+"""What can be told of any flow: whether it is steady, its digest, its divergence."""
+
+import hashlib
+import math
+
+import numpy as np
+
+from ..base.checks import Range
+from ..kernels import flow as kernel
+from ..kernels.terrain import Terrain
+
+
+def is_steady(flow: kernel.Flow) -> bool:
+    """Whether the flow is the same at all times."""
+    if isinstance(flow, kernel.Gyre):
+        return flow.epsilon == 0
+    return math.isinf(flow.t_lo)
+
+
+def flow_sha256(flow: kernel.Flow | Terrain) -> str:
+    """A digest of everything the kernels can read of a flow, or of a terrain."""
+    text = hashlib.sha256(type(flow).__name__.encode())
+    for name, value in zip(flow._fields, flow, strict=True):
+        array = np.ascontiguousarray(value)
+        text.update(f"\n{name} {array.dtype} {array.shape}\n".encode() + array.tobytes())
+    return text.hexdigest()
+
+
+def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096) -> float:
+    """Rms horizontal divergence over rms vorticity in a box [m]; the stream value needs it small.
+
+    0 where the flow has neither; inf where it only diverges.
+    """
+    step = 1e-3 * min(flow.length_scale, x[1] - x[0], y[1] - y[0])
+    share = np.random.default_rng(0).random((3, count))
+    lo = np.array([x[0] + step, y[0] + step, z[0]])
+    hi = np.array([x[1] - step, y[1] - step, z[1]])
+    px, py, pz = lo[:, None] + share * (hi - lo)[:, None]
+    when = np.full(count, t)
+    by_x = kernel.velocities(flow, px + step, py, pz, when) - kernel.velocities(flow, px - step, py, pz, when)
+    by_y = kernel.velocities(flow, px, py + step, pz, when) - kernel.velocities(flow, px, py - step, pz, when)
+    divergence = float(np.sqrt(np.mean((by_x[:, 0] + by_y[:, 1]) ** 2)))
+    vorticity = float(np.sqrt(np.mean((by_x[:, 1] - by_y[:, 0]) ** 2)))
+    if divergence == 0:
+        return 0.0
+    return divergence / vorticity if vorticity > 0 else math.inf

@@ -1,0 +1,66 @@
+"""Analytic flows sampled once on a grid, and how far the grid is off."""
+
+import math
+from functools import partial
+
+import numpy as np
+
+from ..base.checks import Range
+from ..base.settings import require
+from ..base.threads import in_parallel
+from ..kernels import flow as kernel
+from .inspect import is_steady
+
+LINES_AT_ONCE = 8
+"""Lines of a sampled grid that a thread takes at once."""
+
+MAX_SAMPLES = 100_000_000
+"""Largest grid [points] that `sampled` makes: 1.6 GB."""
+
+
+def sample_flow(
+    flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range
+) -> kernel.Grid:
+    """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
+    require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
+    box = [(max(x[0], flow.x_lo), min(x[1], flow.x_hi)), (max(y[0], flow.y_lo), min(y[1], flow.y_hi)), z]
+    points = [(float(hi) - float(lo)) / step + 1 for (lo, hi), step in zip(box, spacing, strict=True)]
+    require(
+        math.prod(points) <= MAX_SAMPLES,
+        f"`flow.sampled` = {list(spacing)} makes {math.prod(points):.3g} points, "
+        f"more than {MAX_SAMPLES:,}; widen it",
+    )
+    counts = [max(2, math.ceil(n - 1e-9)) for n in points]
+    lines = [np.linspace(lo, hi, n) for (lo, hi), n in zip(box, counts, strict=True)]
+    values = np.empty((counts[2], counts[0], counts[1], 2))
+    in_parallel(partial(kernel.sample_lines, flow, *lines, 0.0, values), counts[2] * counts[0], LINES_AT_ONCE)
+    steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
+    level_speed = np.array([np.hypot(level[..., 0], level[..., 1]).max() for level in values])
+    return kernel.Grid(
+        values=values,
+        level_speed=level_speed,
+        level_carry=np.concatenate([[0.0], np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 * steps[2])]),
+        per_x=1 / steps[0],
+        per_y=1 / steps[1],
+        z_first=z[0],
+        per_z=1 / steps[2],
+        x_lo=box[0][0],
+        x_hi=box[0][1],
+        y_lo=box[1][0],
+        y_hi=box[1][1],
+        t_lo=flow.t_lo,
+        t_hi=flow.t_hi,
+        max_speed=float(level_speed.max()),
+        length_scale=max(flow.length_scale / 2, steps[0], steps[1])
+        if math.isfinite(flow.length_scale)
+        else steps[0],
+    )
+
+
+def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, z: Range) -> float:
+    """The most [m/s] that a flow read on a grid is off, at 4096 points of a box [m]."""
+    lo, hi = np.array([x, y, z]).T
+    px, py, pz = (lo + np.random.default_rng(0).random((4096, 3)) * (hi - lo)).T.copy()
+    now = np.zeros(px.size)
+    off = kernel.velocities(flow, px, py, pz, now) - kernel.velocities(sampled, px, py, pz, now)
+    return float(np.hypot(off[:, 0], off[:, 1]).max())
