@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from glider_stream.edges import Evaluator, FlowMapMethod, IntegrationSettings
-from glider_stream.glider import PRESETS, polar
 from glider_stream.kernels.terrain import OpenWater
 from glider_stream.roadmap import node_positions
 from glider_stream.scenario import read_scenario
+from glider_stream.vehicle.polar import polar
+from glider_stream.vehicle.presets import PRESETS
 from glider_stream.water.analytic import DoubleGyre, Rankine, Vortex, Vortices
 from glider_stream.water.sampled import sample_flow
 

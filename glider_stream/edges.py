@@ -12,10 +12,10 @@ from .base.checks import LONGEST, WIDEST
 from .base.settings import require
 from .base.threads import in_parallel
 from .bins import node_bins
-from .cost import Cost, TravelTime
 from .kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
 from .kernels.edges import Edge, Status
 from .kernels.fan import FlowMap
+from .vehicle.cost import Cost, TravelTime
 from .water.inspect import is_steady
 
 MAX_CANDIDATES = 1_000_000

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .bench import Record
-    from .calibration import Calibration
     from .suite import Report
+    from .vehicle.calibration.result import Calibration
     from .verify import Verification
     from .water.describe import Description, Place
     from .water.ocean import Names
@@ -369,8 +369,8 @@ def calibrate(
     columns: Mapping[str, str] | None = None,
 ) -> "Calibration":
     """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says."""
-    from .calibrate import calibrate
-    from .dives import read_dives
+    from .vehicle.calibration.calibrate import calibrate
+    from .vehicle.calibration.dives import read_dives
 
     if output is not None:
         check_output(output)

@@ -13,11 +13,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from .base.arrays import Array, Index
 from .base.settings import require
-from .glider import glider_sha256
 from .kernels.edges import Edge, Status
 from .legs import Attached, Legs
 from .path import Leg, Path
 from .roadmap import EDGE_FIELDS, Problem, Roadmap
+from .vehicle.polar import glider_sha256
 from .water.frame import true_north
 from .water.inspect import flow_sha256
 

@@ -17,12 +17,12 @@ from .base.arrays import Array, Index
 from .base.settings import require
 from .base.threads import threads
 from .edges import Evaluator
-from .glider import glider_sha256
 from .kernels.cache import KERNEL_DIGEST
 from .kernels.edges import Status
 from .legs import Legs, legs_of
 from .neighbours import NeighbourLaw, Reachable
 from .sampling import Sampler
+from .vehicle.polar import glider_sha256
 from .water.inspect import flow_sha256
 
 BATCH_PAIRS = 100_000

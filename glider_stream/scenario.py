@@ -15,14 +15,16 @@ from .base.checks import FASTEST, LONGEST
 from .base.errors import InputError
 from .base.settings import from_kinds, from_table, require
 from .base.toml import to_toml
-from .cost import Cost, Energy, TravelTime, energy_from_table
 from .edges import METHODS, Evaluator, IntegrationSettings, Method
-from .glider import Glider, glider_from_table, polar
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
 from .neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap import Problem
 from .sampling import SAMPLERS, Sampler, YoSampler
+from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
+from .vehicle.models import Glider
+from .vehicle.polar import polar
+from .vehicle.presets import glider_from_table
 from .water.analytic import FLOWS, AnalyticFlow
 from .water.domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .water.inspect import divergence_ratio, is_steady

@@ -11,11 +11,12 @@ from small import SCENARIO, command, strict_json
 from test_ocean import DATA, real
 
 from glider_stream.base.errors import InputError
-from glider_stream.calibrate import calibrate
-from glider_stream.calibration import CONFIDENCE
-from glider_stream.dives import MOST_DIVES, read_dives
-from glider_stream.glider import glider_from_table, polar
 from glider_stream.scenario import scenario_from_text
+from glider_stream.vehicle.calibration.calibrate import calibrate
+from glider_stream.vehicle.calibration.dives import MOST_DIVES, read_dives
+from glider_stream.vehicle.calibration.result import CONFIDENCE
+from glider_stream.vehicle.polar import polar
+from glider_stream.vehicle.presets import glider_from_table
 
 CSV = DATA / "seaglider_sg542_saz_dac.csv"
 SPEEDS = ("vertical_speed", "horizontal_speed")

@@ -10,12 +10,12 @@ from small import command, roadmap, scenario_file, strict_json
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.cost import GRAVITY, PRESETS, Energy, TravelTime
 from glider_stream.kernels.cost import edge_cost
 from glider_stream.query import Blend, Planner
 from glider_stream.roadmap import Roadmap
 from glider_stream.scenario import read_scenario
 from glider_stream.trade_off import trade_off
+from glider_stream.vehicle.cost import GRAVITY, PRESETS, Energy, TravelTime
 
 ENERGY = [
     'cost={}', "cost.kind=energy", "cost.hotel=2.0", "cost.trim=5.0", "cost.volume=300.0", "cost.density=1025.0",

@@ -15,8 +15,8 @@ FLOORS = {
     2: "kernels.control",
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine base",
-    4: "cost bins glider brute_force water water",
-    5: "dives flown fit calibration calibrate sampling neighbours edges legs",
+    4: "bins brute_force water water vehicle",
+    5: "sampling neighbours edges legs",
     6: "roadmap path waypoints windows drawn difference",
     7: "store journal query change",
     8: "slocum seaglider export plot verify cluster jobs baselines surfacing trade_off card thin score",

@@ -7,15 +7,6 @@ import numpy as np
 import pytest
 
 from glider_stream.base.errors import InputError
-from glider_stream.glider import (
-    POLAR_TOLERANCE,
-    PRESETS,
-    Seaglider,
-    SteadyGlide,
-    glider_from_table,
-    glider_sha256,
-    polar,
-)
 from glider_stream.kernels.control import (
     CLIMB,
     DIVE,
@@ -24,6 +15,9 @@ from glider_stream.kernels.control import (
     horizontal_speed,
     vertical_speed,
 )
+from glider_stream.vehicle.models import Seaglider, SteadyGlide
+from glider_stream.vehicle.polar import POLAR_TOLERANCE, glider_sha256, polar
+from glider_stream.vehicle.presets import PRESETS, glider_from_table
 
 PAPER, SLOCUM, SEAGLIDER = PRESETS["paper"], PRESETS["slocum"], PRESETS["seaglider"]
 GRAVER = replace(PAPER, offset=0.5, ballast_max=1.0)

@@ -21,13 +21,13 @@ from test_jobs import interrupt, problem
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped
-from glider_stream.calibrate import calibrate
-from glider_stream.dives import read_dives
 from glider_stream.drawn import read_drawn
 from glider_stream.jobs import Job, Shard, build_file, merge
 from glider_stream.path import load_path
 from glider_stream.scenario import read_scenario
 from glider_stream.store import read_part, read_roadmap, write_roadmap
+from glider_stream.vehicle.calibration.calibrate import calibrate
+from glider_stream.vehicle.calibration.dives import read_dives
 from glider_stream.water.frame import LocalFrame
 from glider_stream.water.ocean.bathymetry import read_bathymetry
 from glider_stream.water.terrain import read_polygons

@@ -19,11 +19,11 @@ from glider_stream import jobs, planner, store
 from glider_stream.base.errors import InputError
 from glider_stream.base.output import check_output, replacing
 from glider_stream.difference import difference
-from glider_stream.glider import glider_sha256
 from glider_stream.kernels.cache import KERNEL_DIGEST
 from glider_stream.kernels.edges import Status
 from glider_stream.scenario import read_scenario, scenario_from_text
 from glider_stream.store import read_roadmap, write_roadmap
+from glider_stream.vehicle.polar import glider_sha256
 from glider_stream.water.inspect import flow_sha256
 
 DATASETS = {

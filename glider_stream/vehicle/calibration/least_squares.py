@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.arrays import Array
+from ...base.arrays import Array
+from ..models import Glider
 from .dives import Dives
-from .flown import Flown, distances
-from .glider import Glider
+from .instruments import Flown, distances
 
 SPEED_ERROR, ANGLE_ERROR = 0.01, math.radians(1.0)
 """What a recorded speed [m/s] and angle [rad] may err by, as far as their ratio is not seen in the dives."""
@@ -37,7 +37,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Problem:
+class FitProblem:
     """What is fitted: `dives`, and the preset with its `own` volume off neutral [cc].
 
     `kinds` of instruments; `groups` (n,) of dives that share a volume to be found, or the `recorded` ones (n,).

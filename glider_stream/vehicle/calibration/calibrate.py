@@ -10,14 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.errors import InputError
-from .base.settings import require
-from .calibration import CONFIDENCE, Calibration, Parameter, scatter
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
+from ..models import Glider, Seaglider, SteadyGlide
+from ..polar import polar
+from ..presets import PRESETS
 from .dives import Dives
-from .fit import FURTHEST_MAIN, Fit, Problem
-from .flown import per_volume, vehicle
-from .glider import PRESETS, Glider, Seaglider, SteadyGlide, polar
+from .instruments import per_volume, vehicle
+from .least_squares import FURTHEST_MAIN, Fit, FitProblem
+from .result import CONFIDENCE, Calibration, Parameter, scatter
 
 VEHICLES = ("seaglider", "slocum")
 KEYS: dict[type[Glider], tuple[str, str, str]] = {
@@ -79,7 +81,7 @@ def calibrate(dives: Dives, preset: str = "seaglider") -> Calibration:
     return _calibration(problem, preset, fit, held)
 
 
-def _vague(problem: Problem, fit: Fit, first: Fit) -> tuple[str, str] | None:
+def _vague(problem: FitProblem, fit: Fit, first: Fit) -> tuple[str, str] | None:
     """The coefficient that the dives determine worst, and why it does not do; `first`: the fit without any."""
     loose = [n for n in range(len(fit.names)) if fit.names[n] not in first.names]
     if not loose:
@@ -103,19 +105,19 @@ def _held(drag: str, base: Glider) -> dict[str, str]:
     return {drag: "without a recorded buoyancy only its ratio to the buoyancy shows", shape: why}
 
 
-def _problem(dives: Dives, base: Glider) -> Problem:
+def _problem(dives: Dives, base: Glider) -> FitProblem:
     unit = per_volume(base)
     own = base.dive_volume if isinstance(base, Seaglider) else float(base.net_mass(-1.0)) / unit
     kinds = tuple(kind for kind in INSTRUMENTS if getattr(dives, kind) is not None)
     if dives.buoyancy is not None:
-        return Problem(dives, base, own, kinds, {}, dives.buoyancy / (unit if dives.unit == "kg" else 1.0))
+        return FitProblem(dives, base, own, kinds, {}, dives.buoyancy / (unit if dives.unit == "kg" else 1.0))
     groups = {"buoyancy": np.full(dives.vertical.size, True)}
     if dives.down is not None and min(dives.down.sum(), (~dives.down).sum()) > 1:
         groups = {"dive_buoyancy": dives.down, "climb_buoyancy": ~dives.down}
-    return Problem(dives, base, own, kinds, groups, None)
+    return FitProblem(dives, base, own, kinds, groups, None)
 
 
-def _calibration(problem: Problem, preset: str, fit: Fit, held: dict[str, str]) -> Calibration:
+def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str]) -> Calibration:
     """The vehicle that a fit found, and how far the dives are from it at the angles that they were flown at."""
     from scipy.special import stdtrit
 

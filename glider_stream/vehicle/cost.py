@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base.arrays import Array
-from .base.settings import require
-from .kernels import cost
+from ..base.arrays import Array
+from ..base.settings import require
+from ..kernels import cost
 
 GRAVITY = 9.81
 

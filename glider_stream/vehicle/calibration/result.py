@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.toml import to_toml
+from ...base.arrays import Array
+from ...base.toml import to_toml
+from ..models import MODELS, Glider
 from .dives import Dives
-from .glider import MODELS, Glider
 
 CONFIDENCE = 0.99
 """The share of further dives that the uncertainty shown is to hold."""

@@ -5,32 +5,19 @@ is > 0 in a dive, < 0 in a climb, so that pitch = gamma + alpha is shallower tha
 dataclass and one row of MODELS.
 """
 
-import hashlib
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from .base.errors import InputError
-from .base.settings import from_kinds, from_table, require
-from .kernels.control import CLIMB, DIVE, Polar
-from .kernels.flow import Array
+from ..base.arrays import Array
+from ..base.settings import require
+from ..kernels.control import CLIMB, DIVE
+from .polar import polar
 
-POLAR_TOLERANCE = 1e-7  # relative error of the table, linear between its angles
-POLAR_STEPS = (256, 65536)  # fewest and most steps of the table
 SOLVE_TOLERANCE = 1e-13  # of ln q
 SOLVE_STEPS = 100  # 4 to 7 do for a usable range, 20 within 1e-12 rad of the limit
-ROUNDING = 8 * np.finfo(np.float64).eps  # more than the kernels' interpolation errs by
-
-# the papers' symbols, accepted for the keys
-SYMBOLS = {
-    **{"K_D0": "drag_0", "K_D": "drag_alpha2", "K_L0": "lift_0", "K_L": "lift_alpha"},
-    **{"off": "offset", "m_b_max": "ballast_max", "g": "gravity"},
-    **{"a": "lift", "b": "drag", "c": "induced_drag", "s": "drag_exponent", "rho0": "density", "l": "length"},
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,123 +214,3 @@ class Seaglider(Glider):
 
 
 MODELS: dict[str, type[Glider]] = {"steady-glide": SteadyGlide, "seaglider": Seaglider}
-
-PRESETS: dict[str, Glider] = {
-    "paper": SteadyGlide(
-        name="paper",
-        note="a Slocum's coefficients by Graver (2005), with the net mass that gives the source paper's "
-        "0.9 m/s horizontal; optimistic: the drag is 3.6 times below field-calibrated",
-        angles=(10.0, 45.0),
-        gravity=9.81,
-        drag_0=2.15,
-        drag_alpha2=25.0,
-        lift_0=0.0,
-        lift_alpha=132.5,
-        offset=0.464051,
-        ballast_max=0.928102,
-    ),
-    "slocum": SteadyGlide(
-        name="slocum",
-        note="a Slocum calibrated in the field (Merckelbach et al. 2019; gliderflight with C_D0 = 0.15, "
-        "S = 0.1 m^2, rho = 1024 kg/m^3), 250 cc heavy or light",
-        angles=(20.0, 45.0),
-        gravity=9.81,
-        drag_0=7.68,
-        drag_alpha2=537.2229,
-        lift_0=0.0,
-        lift_alpha=385.7546,
-        offset=0.256,
-        ballast_max=0.512,
-    ),
-    "seaglider": Seaglider(
-        name="seaglider",
-        note="the default flight model of the University of Washington's basestation3, 150 cc heavy or light",
-        angles=(15.0, 45.0),
-        gravity=9.82,
-        lift=0.003548134,
-        drag=0.011220184,
-        induced_drag=5.7e-6,
-        drag_exponent=-0.25,
-        length=1.8,
-        density=1027.5,
-        dive_volume=150.0,
-        climb_volume=150.0,
-    ),
-}
-
-
-def glider_from_table(table: Mapping[str, Any]) -> Glider:
-    """The glider of a scenario's [glider] table: `preset` and overrides, or `model` and all its keys."""
-    named: dict[str, Any] = {}
-    for key, value in table.items():
-        name = SYMBOLS.get(key, key)
-        require(name not in named, f"`glider.{name}` is given twice, by its name and by its symbol")
-        named[name] = value
-    if "preset" not in named:
-        missing = f"`glider.preset` is missing: choose from: {', '.join(PRESETS)}; or give `glider.model`"
-        require("model" in named, missing)
-        return from_kinds(MODELS, named, "glider", selector="model")
-    preset = named.pop("preset")
-    if not isinstance(preset, str) or preset not in PRESETS:
-        raise InputError(f"`glider.preset` = {preset!r} is not known; choose from: {', '.join(PRESETS)}")
-    if not named:
-        return PRESETS[preset]
-    base = PRESETS[preset]
-    says = {"name": f"{preset}, modified", "note": f"{base.note}; changed: {', '.join(named)}"}
-    return from_table(type(base), asdict(base) | says | named, "glider")
-
-
-def polar(model: Glider) -> Polar:
-    """The kernels' table of V [m/s] over |gamma|, with as many steps as POLAR_TOLERANCE needs."""
-    low, high = np.radians(model.angles)
-    steps, most = POLAR_STEPS
-    while True:
-        # twice as fine as the table: every other angle is a middle, where a chord errs most
-        angle = np.linspace(low, high, 2 * steps + 1)
-        speed = np.stack([model.speed(-angle), model.speed(angle)])
-        chord = 0.5 * (speed[:, :-2:2] + speed[:, 2::2])
-        if np.max(np.abs(chord / speed[:, 1::2] - 1.0)) < 0.9 * POLAR_TOLERANCE:
-            break
-        steps *= 2
-        if steps > most:
-            limits = np.degrees(np.abs(model.feasible_limits()))
-            raise InputError(
-                f"`glider.angles` = {list(model.angles)} begins too near the limit of a steady glide, "
-                f"{limits.max():.4f} degrees, for a table of {most} steps: begin steeper"
-            )
-    angle, speed = angle[::2], np.ascontiguousarray(speed[:, ::2])
-    fastest = np.array([_fastest(angle, row) for row in speed])
-    return Polar(np.full(2, low), np.full(2, high), speed, fastest[:, 0].copy(), fastest[:, 1].copy())
-
-
-def _fastest(angle: Array, speed: Array) -> tuple[float, float]:
-    """Angle [rad] and value [m/s] of the greatest V cos(angle), V linear between the rows of a table.
-
-    InputError unless V cos rises to it and falls after it, and V sin rises throughout: the kernels bisect.
-    """
-    slope = np.diff(speed) / np.diff(angle)
-    ends, values = np.stack([angle[:-1], angle[1:]]), np.stack([speed[:-1], speed[1:]])
-    # derivatives at both ends of every step
-    sinking = slope * np.sin(ends) + values * np.cos(ends)
-    rising = (slope * np.cos(ends) - values * np.sin(ends) > 0.0).T.ravel()
-    count = int(np.count_nonzero(rising))
-    where = f"within `glider.angles` = {np.degrees(angle[[0, -1]]).round(4).tolist()}"
-    require(bool(np.all(sinking > 0.0)), f"the vertical speed must rise with the glide angle {where}")
-    require(bool(np.all(rising[:count])), f"the horizontal speed must have one maximum {where}")
-    step = count // 2
-    best = float(angle[step])
-    if count % 2:  # inside the step, where the derivative is all but linear: Newton
-        for _ in range(5):
-            along = speed[step] + slope[step] * (best - angle[step])
-            sine, cosine = math.sin(best), math.cos(best)
-            best += float((slope[step] * cosine - along * sine) / (2.0 * slope[step] * sine + along * cosine))
-    # rounded up: no control may be faster than the lowest-speed test believes
-    return best, float(np.interp(best, angle, speed) * math.cos(best) * (1.0 + ROUNDING))
-
-
-def glider_sha256(polar: Polar) -> str:
-    """Digest of the polar's numbers, for the roadmap file: the same glider, the same digest."""
-    digest = hashlib.sha256()
-    for array in polar:
-        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
-    return digest.hexdigest()

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.arrays import Array
-from .base.errors import InputError
-from .base.settings import require
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
 
 COLUMNS = {
     "vertical": ("vertical_speed", "vertical_speed_mps", "mean_abs_vert_speed_mps", "vert_speed", "w", "w_mps"),

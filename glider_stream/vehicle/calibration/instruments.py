@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .base.arrays import Array
+from ...base.arrays import Array
+from ..models import Glider, Seaglider, SteadyGlide
 from .dives import Dives
-from .glider import Glider, Seaglider, SteadyGlide
 
 DENSITY = 1024.0
 """Of sea water [kg/m^3], where a model has none, to make a mass of a volume; that of the preset `slocum`."""

@@ -1,0 +1,1 @@
+"""A vehicle's own values, out of its own dives."""

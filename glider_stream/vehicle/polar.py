@@ -1,0 +1,91 @@
+"""The glide polar: a model's speeds as a table for the kernels."""
+
+import hashlib
+import math
+from typing import Protocol
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
+from ..kernels.control import Polar
+
+POLAR_TOLERANCE = 1e-7  # relative error of the table, linear between its angles
+
+POLAR_STEPS = (256, 65536)  # fewest and most steps of the table
+
+ROUNDING = 8 * np.finfo(np.float64).eps  # more than the kernels' interpolation errs by
+
+
+class SteadyModel(Protocol):
+    """What a polar is made of: a model of steady glides, as in `models`."""
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """The range of |gamma| [degrees]."""
+        ...
+
+    def speed(self, gamma: Array | float) -> Array:
+        """Speed through water [m/s] at signed glide angles [rad]."""
+        ...
+
+    def feasible_limits(self) -> tuple[float, float]:
+        """The shallowest steady dive (< 0) and climb (> 0) [rad]."""
+        ...
+
+
+def polar(model: SteadyModel) -> Polar:
+    """The kernels' table of V [m/s] over |gamma|, with as many steps as POLAR_TOLERANCE needs."""
+    low, high = np.radians(model.angles)
+    steps, most = POLAR_STEPS
+    while True:
+        # twice as fine as the table: every other angle is a middle, where a chord errs most
+        angle = np.linspace(low, high, 2 * steps + 1)
+        speed = np.stack([model.speed(-angle), model.speed(angle)])
+        chord = 0.5 * (speed[:, :-2:2] + speed[:, 2::2])
+        if np.max(np.abs(chord / speed[:, 1::2] - 1.0)) < 0.9 * POLAR_TOLERANCE:
+            break
+        steps *= 2
+        if steps > most:
+            limits = np.degrees(np.abs(model.feasible_limits()))
+            raise InputError(
+                f"`glider.angles` = {list(model.angles)} begins too near the limit of a steady glide, "
+                f"{limits.max():.4f} degrees, for a table of {most} steps: begin steeper"
+            )
+    angle, speed = angle[::2], np.ascontiguousarray(speed[:, ::2])
+    fastest = np.array([_fastest(angle, row) for row in speed])
+    return Polar(np.full(2, low), np.full(2, high), speed, fastest[:, 0].copy(), fastest[:, 1].copy())
+
+
+def _fastest(angle: Array, speed: Array) -> tuple[float, float]:
+    """Angle [rad] and value [m/s] of the greatest V cos(angle), V linear between the rows of a table.
+
+    InputError unless V cos rises to it and falls after it, and V sin rises throughout: the kernels bisect.
+    """
+    slope = np.diff(speed) / np.diff(angle)
+    ends, values = np.stack([angle[:-1], angle[1:]]), np.stack([speed[:-1], speed[1:]])
+    # derivatives at both ends of every step
+    sinking = slope * np.sin(ends) + values * np.cos(ends)
+    rising = (slope * np.cos(ends) - values * np.sin(ends) > 0.0).T.ravel()
+    count = int(np.count_nonzero(rising))
+    where = f"within `glider.angles` = {np.degrees(angle[[0, -1]]).round(4).tolist()}"
+    require(bool(np.all(sinking > 0.0)), f"the vertical speed must rise with the glide angle {where}")
+    require(bool(np.all(rising[:count])), f"the horizontal speed must have one maximum {where}")
+    step = count // 2
+    best = float(angle[step])
+    if count % 2:  # inside the step, where the derivative is all but linear: Newton
+        for _ in range(5):
+            along = speed[step] + slope[step] * (best - angle[step])
+            sine, cosine = math.sin(best), math.cos(best)
+            best += float((slope[step] * cosine - along * sine) / (2.0 * slope[step] * sine + along * cosine))
+    # rounded up: no control may be faster than the lowest-speed test believes
+    return best, float(np.interp(best, angle, speed) * math.cos(best) * (1.0 + ROUNDING))
+
+
+def glider_sha256(polar: Polar) -> str:
+    """Digest of the polar's numbers, for the roadmap file: the same glider, the same digest."""
+    digest = hashlib.sha256()
+    for array in polar:
+        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return digest.hexdigest()
