@@ -23,11 +23,11 @@ import numpy as np
 from completeness_fields import BEYOND, fields
 
 from glider_stream import brute_force
-from glider_stream.edges import Evaluator
 from glider_stream.kernels.edges import Status
 from glider_stream.kernels.flow import Grid
-from glider_stream.neighbours import AllNodes, Nearest, as_csr
-from glider_stream.verify import replayed_misses
+from glider_stream.roadmap.evaluator import Evaluator
+from glider_stream.roadmap.neighbours import AllNodes, Nearest, as_csr
+from glider_stream.roadmap.verify import replayed_misses
 
 SCAN = (48, 96)
 LATE = 1.0

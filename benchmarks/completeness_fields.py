@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from glider_stream.edges import Evaluator, FlowMapMethod, IntegrationSettings
 from glider_stream.kernels.terrain import OpenWater
-from glider_stream.roadmap import node_positions
+from glider_stream.roadmap.builder import node_positions
+from glider_stream.roadmap.evaluator import Evaluator
+from glider_stream.roadmap.steering import FlowMapMethod, IntegrationSettings
 from glider_stream.scenario import read_scenario
 from glider_stream.vehicle.polar import polar
 from glider_stream.vehicle.presets import PRESETS

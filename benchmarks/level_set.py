@@ -60,7 +60,7 @@ from glider_stream.base.errors import InputError
 from glider_stream.base.settings import require
 from glider_stream.kernels.flow import velocities
 from glider_stream.kernels.motion import rk4_step
-from glider_stream.roadmap import Problem
+from glider_stream.roadmap.problem import Problem
 from glider_stream.scenario import read_scenario
 from glider_stream.water.inspect import is_steady
 

@@ -13,11 +13,11 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from glider_stream.edges import FlowMapMethod
 from glider_stream.kernels.control import CLIMB, DIVE, candidate_controls, control_towards
 from glider_stream.kernels.motion import along_segment, rk4_step
-from glider_stream.neighbours import AllNodes, Nearest, as_csr
-from glider_stream.roadmap import node_positions
+from glider_stream.roadmap.builder import node_positions
+from glider_stream.roadmap.neighbours import AllNodes, Nearest, as_csr
+from glider_stream.roadmap.steering import FlowMapMethod
 from glider_stream.scenario import read_scenario
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numba
 
 from glider_stream.query import Planner
-from glider_stream.roadmap import build_roadmap
+from glider_stream.roadmap.builder import build_roadmap
 from glider_stream.scenario import read_scenario
 
 SAMPLED = [(method, candidates) for candidates in (16, 54) for method in ("streamline", "surface")]

@@ -16,7 +16,7 @@ from pathlib import Path
 import xarray as xr
 
 from glider_stream import planner
-from glider_stream.difference import difference
+from glider_stream.roadmap.compare import difference
 from glider_stream.scenario import read_scenario
 
 

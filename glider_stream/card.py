@@ -9,7 +9,7 @@ import numpy as np
 
 from .kernels.flow import velocities
 from .path import Leg, Path
-from .roadmap import Problem
+from .roadmap.problem import Problem
 from .waypoints import SURFACE
 
 DAY = 86_400.0

@@ -10,11 +10,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from .base.arrays import Array, Bools
 from .base.settings import require
-from .edges import FlowMapMethod
 from .kernels.flow import Flow, Grid, OceanGrid
 from .kernels.terrain import Seabed
-from .legs import NeighbourLegs
-from .roadmap import Problem, Roadmap, node_positions, provenance_of
+from .roadmap.builder import node_positions
+from .roadmap.pairs import NeighbourLegs
+from .roadmap.problem import Problem
+from .roadmap.provenance import provenance_of
+from .roadmap.roadmap import Roadmap
+from .roadmap.steering import FlowMapMethod
 
 SIDE = 480
 """Cells along the longer side of the lattice that times are bounded on."""

@@ -18,7 +18,9 @@ from .base.errors import InputError
 from .base.settings import require
 from .base.threads import threads
 from .kernels.cache import KERNEL_DIGEST
-from .roadmap import Edges, Problem, find_edges, warm_up
+from .roadmap.builder import find_edges, warm_up
+from .roadmap.problem import Problem
+from .roadmap.roadmap import Edges
 
 AHEAD = 4
 """Chunks that wait at the scheduler for each thread of a worker."""

@@ -15,23 +15,12 @@ from .base.output import check_output
 from .base.settings import require
 from .base.threads import threads
 from .journal import Journal
-from .roadmap import (
-    BATCH_PAIRS,
-    EDGE_FIELDS,
-    Edges,
-    Problem,
-    Progress,
-    Provenance,
-    Roadmap,
-    Tally,
-    find_edges,
-    in_order,
-    lonlat_of,
-    node_positions,
-    provenance_of,
-    warm_up,
-)
-from .store import Shard, read_part, writing
+from .roadmap.builder import BATCH_PAIRS, Progress, Tally, find_edges, node_positions, warm_up
+from .roadmap.problem import Problem
+from .roadmap.provenance import lonlat_of, provenance_of
+from .roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
+from .roadmap.shard import Shard
+from .roadmap.store import read_part, writing
 
 Finder = Callable[[Problem, Array, Index, int], Iterator[Edges]]
 CHECKPOINT = 30.0

@@ -14,18 +14,20 @@ from .base.output import check_output, replacing
 from .base.settings import require
 from .card import Card
 from .card import card as card_of
-from .difference import Difference, difference
 from .drawn import read_drawn
 from .export import check_export, export_path
 from .jobs import Job, build_file, shard_of
 from .jobs import merge as merge_parts
 from .path import Path, load_path
-from .query import Planner, check_unchanged
-from .roadmap import Progress, Roadmap, build_roadmap, node_positions
+from .query import Planner
+from .roadmap.builder import Progress, build_roadmap, node_positions
+from .roadmap.compare import Difference, difference
+from .roadmap.provenance import check_unchanged
+from .roadmap.roadmap import Roadmap
+from .roadmap.store import read_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .score import Score
 from .score import score as score_of
-from .store import read_roadmap
 from .surfacing import Surfacing, SurfacingPlanner
 from .thin import thin as thinned
 from .trade_off import TradeOff
@@ -38,9 +40,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .bench import Record
+    from .roadmap.verify import Verification
     from .suite import Report
     from .vehicle.calibration.result import Calibration
-    from .verify import Verification
     from .water.describe import Description, Place
     from .water.ocean import Names
 
@@ -237,7 +239,7 @@ def _search(
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":
     """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too."""
-    from .verify import verify
+    from .roadmap.verify import verify
 
     return verify(roadmap, lambda text: scenario_from_text(text).problem(), sample)
 

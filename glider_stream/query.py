@@ -14,32 +14,17 @@ from scipy.sparse.csgraph import dijkstra
 from .base.arrays import Array, Index
 from .base.settings import require
 from .kernels.edges import Edge, Status
-from .legs import Attached, Legs
 from .path import Leg, Path
-from .roadmap import EDGE_FIELDS, Problem, Roadmap
-from .vehicle.polar import glider_sha256
+from .roadmap.pairs import Attached, Legs
+from .roadmap.problem import Problem
+from .roadmap.provenance import check_unchanged
+from .roadmap.roadmap import EDGE_FIELDS, Roadmap
 from .water.frame import true_north
-from .water.inspect import flow_sha256
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
 """By how much a leg that is flown again may miss by more than the tolerance, in tolerances: as in verify."""
 NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
-
-
-def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
-    """InputError unless flow, terrain and glider are those that the roadmap was built with."""
-    made = roadmap.provenance
-    for name, digest, now in (
-        ("flow", made.flow_sha256, flow_sha256(problem.evaluator.flow)),
-        ("terrain", made.terrain_sha256, flow_sha256(problem.evaluator.terrain)),
-        ("glider", made.glider_sha256, glider_sha256(problem.evaluator.polar)),
-    ):
-        require(
-            digest in ("", now),  # earlier versions of the program did not say the terrain's
-            f"the {name} has changed since the roadmap was built (its digest was {digest[:12]}, it is "
-            f"{now[:12]} now); build the roadmap again",
-        )
 
 
 @dataclass(frozen=True)

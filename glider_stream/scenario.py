@@ -15,12 +15,13 @@ from .base.checks import FASTEST, LONGEST
 from .base.errors import InputError
 from .base.settings import from_kinds, from_table, require
 from .base.toml import to_toml
-from .edges import METHODS, Evaluator, IntegrationSettings, Method
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
-from .neighbours import NEIGHBOURS, NeighbourLaw, Reachable
-from .roadmap import Problem
-from .sampling import SAMPLERS, Sampler, YoSampler
+from .roadmap.evaluator import Evaluator
+from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
+from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
+from .roadmap.problem import Problem
+from .roadmap.steering import METHODS, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
 from .vehicle.polar import polar

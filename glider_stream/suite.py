@@ -16,12 +16,13 @@ from .base.threads import threads
 from .baselines import BASELINES
 from .bench import made_by
 from .brute_force import fastest_legs
-from .edges import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
 from .kernels.edges import Status
-from .neighbours import Reachable
 from .query import Planner
-from .roadmap import Problem, build_roadmap
-from .sampling import SobolSampler
+from .roadmap.builder import build_roadmap
+from .roadmap.neighbours import Reachable
+from .roadmap.nodes import SobolSampler
+from .roadmap.problem import Problem
+from .roadmap.steering import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
 from .scenario import read_scenario
 
 METHODS: dict[str, Method] = {

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 from .base.arrays import Array, Index
 from .base.settings import require
 from .kernels.edges import Status
-from .legs import Attached, Legs
 from .path import Path
 from .query import End, Planner
-from .roadmap import EDGE_FIELDS, Problem, Roadmap
+from .roadmap.pairs import Attached, Legs
+from .roadmap.problem import Problem
+from .roadmap.roadmap import EDGE_FIELDS, Roadmap
 from .waypoints import SURFACE
 
 BINS = 48

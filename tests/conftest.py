@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from glider_stream.edges import Evaluator, IntegrationSettings, StreamlineMethod
 from glider_stream.kernels.flow import OceanGrid
 from glider_stream.kernels.terrain import OpenWater
+from glider_stream.roadmap.evaluator import Evaluator
+from glider_stream.roadmap.steering import IntegrationSettings, StreamlineMethod
 from glider_stream.vehicle.polar import polar
 from glider_stream.vehicle.presets import PRESETS
 from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, Uniform, Vortex, Vortices

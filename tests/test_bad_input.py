@@ -10,7 +10,7 @@ import h5py
 import pytest
 from small import SCENARIO, command, executable, roadmap, scenario_file
 
-from glider_stream.store import write_roadmap
+from glider_stream.roadmap.store import write_roadmap
 
 OLD = b"what was here before"
 

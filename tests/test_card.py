@@ -9,7 +9,7 @@ from small import command, roadmap, strict_json
 from test_export import route
 
 from glider_stream.card import card
-from glider_stream.store import write_roadmap
+from glider_stream.roadmap.store import write_roadmap
 from glider_stream.water.analytic import Uniform
 
 DIVES = [[0.0, 0.0, 0.0], [600.0, 0.0, -200.0], [600.0, 800.0, -5.0], [600.0, 400.0, -90.0], [0.0, 400.0, -8.0]]

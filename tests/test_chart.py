@@ -19,8 +19,8 @@ from glider_stream.plot.graticule import draw_graticule, named, round_degrees
 from glider_stream.plot.seabed import known_until, without_clearance
 from glider_stream.plot.water import frame_of
 from glider_stream.query import Planner
+from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
-from glider_stream.store import write_roadmap
 from glider_stream.water.frame import LocalFrame
 
 

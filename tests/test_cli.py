@@ -11,7 +11,7 @@ from small import command, executable, roadmap, scenario_file, strict_json
 
 from glider_stream.base import progress
 from glider_stream.cli import cli
-from glider_stream.store import read_roadmap, write_roadmap
+from glider_stream.roadmap.store import read_roadmap, write_roadmap
 
 LOG = "build: 1,540 of 1,540 pairs, "
 

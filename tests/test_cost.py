@@ -12,7 +12,7 @@ from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.cost import edge_cost
 from glider_stream.query import Blend, Planner
-from glider_stream.roadmap import Roadmap
+from glider_stream.roadmap.roadmap import Roadmap
 from glider_stream.scenario import read_scenario
 from glider_stream.trade_off import trade_off
 from glider_stream.vehicle.cost import GRAVITY, PRESETS, Energy, TravelTime

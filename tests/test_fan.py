@@ -7,9 +7,9 @@ from small import scenario_file
 
 from glider_stream import brute_force, planner
 from glider_stream.base.threads import threads
-from glider_stream.edges import FlowMapMethod, StreamlineMethod
 from glider_stream.kernels.edges import Edge
-from glider_stream.neighbours import as_csr
+from glider_stream.roadmap.neighbours import as_csr
+from glider_stream.roadmap.steering import FlowMapMethod, StreamlineMethod
 from glider_stream.water.sampled import sample_flow
 
 CONNECTED, TIME, ANGLE, HEADING, SPEED, MISS = 0, 1, 3, 4, 5, 6

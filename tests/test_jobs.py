@@ -16,13 +16,15 @@ import numpy as np
 import pytest
 from small import command, executable, scenario_file
 
-from glider_stream import jobs, journal, planner, roadmap, store
+from glider_stream import jobs, journal, planner
 from glider_stream.base.errors import InputError, Stopped
 from glider_stream.jobs import Job, Shard, build_file, merge, shard_of
 from glider_stream.kernels.edges import Status
-from glider_stream.roadmap import Edges, build_roadmap, find_edges, in_order
+from glider_stream.roadmap import roadmap, store
+from glider_stream.roadmap.builder import build_roadmap, find_edges
+from glider_stream.roadmap.roadmap import Edges, in_order
+from glider_stream.roadmap.store import read_part, read_roadmap
 from glider_stream.scenario import read_scenario
-from glider_stream.store import read_part, read_roadmap
 
 METHODS = {
     "streamline": [],

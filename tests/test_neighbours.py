@@ -7,7 +7,7 @@ import pytest
 import reference
 
 from glider_stream.base.errors import InputError
-from glider_stream.neighbours import AllNodes, Nearest, Radius, as_csr
+from glider_stream.roadmap.neighbours import AllNodes, Nearest, Radius, as_csr
 
 VOLUME = 600.0 * 600.0 * 300.0
 

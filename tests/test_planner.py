@@ -9,9 +9,9 @@ from small import command, roadmap, scenario_file
 import glider_stream
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.roadmap import Roadmap
+from glider_stream.roadmap.roadmap import Roadmap
+from glider_stream.roadmap.store import read_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario
-from glider_stream.store import read_roadmap, write_roadmap
 
 ARRAYS = ("position", "indptr", "target", "time", "cost", "glide_angle", "heading", "speed", "miss")
 

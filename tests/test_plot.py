@@ -17,7 +17,7 @@ from glider_stream.base.errors import InputError
 from glider_stream.kernels.flow import OceanGrid, Vortices, velocity
 from glider_stream.kernels.terrain import OpenWater, Seabed, allowed
 from glider_stream.path import Leg, Path
-from glider_stream.roadmap import node_positions
+from glider_stream.roadmap.builder import node_positions
 from glider_stream.scenario import scenario_from_table
 
 UNIT = re.compile(r"\((m|km|s|min|h|days|m/s|°|degrees|count)\)")

@@ -11,9 +11,9 @@ from test_ocean import IONIAN, WASHINGTON, real
 
 from glider_stream import planner
 from glider_stream.export import export_path
+from glider_stream.roadmap.verify import verify
 from glider_stream.scenario import read_scenario
 from glider_stream.slocum import lint
-from glider_stream.verify import verify
 from glider_stream.waypoints import SURFACE, from_degrees_and_minutes, waypoints
 
 gpxpy, kml, shapely, pyproj = (

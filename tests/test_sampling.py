@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from glider_stream.base.errors import InputError
-from glider_stream.sampling import SAMPLERS, GridSampler, HaltonSampler, RandomSampler, SobolSampler, YoSampler
+from glider_stream.roadmap.nodes import (
+    SAMPLERS,
+    GridSampler,
+    HaltonSampler,
+    RandomSampler,
+    SobolSampler,
+    YoSampler,
+)
 
 LO, HI = np.array([-300.0, 50.0, -200.0]), np.array([100.0, 250.0, 0.0])
 every_random = pytest.mark.parametrize("sampler", [RandomSampler, SobolSampler, HaltonSampler])

@@ -8,10 +8,10 @@ from small import SCENARIO, scenario_file
 
 from glider_stream.base.errors import InputError
 from glider_stream.base.toml import to_toml
-from glider_stream.edges import StreamlineMethod, SurfaceMethod
-from glider_stream.neighbours import AllNodes, Nearest, Radius
-from glider_stream.roadmap import node_positions
-from glider_stream.sampling import GridSampler, SobolSampler
+from glider_stream.roadmap.builder import node_positions
+from glider_stream.roadmap.neighbours import AllNodes, Nearest, Radius
+from glider_stream.roadmap.nodes import GridSampler, SobolSampler
+from glider_stream.roadmap.steering import StreamlineMethod, SurfaceMethod
 from glider_stream.scenario import read_scenario, scenario_from_text, shipped_scenarios
 from glider_stream.water.analytic import Uniform, Vortices
 from glider_stream.water.domain import BoxDomain, GeographicDomain

@@ -15,13 +15,13 @@ from test_export import FRAME, STOPS, route
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.drawn import FORMS, MOST_TEXT, read_drawn
-from glider_stream.edges import SurfaceMethod
 from glider_stream.export import export_path
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.query import Planner
+from glider_stream.roadmap.steering import SurfaceMethod
+from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
 from glider_stream.score import REASONS, score
-from glider_stream.store import write_roadmap
 
 
 @pytest.fixture(scope="module")

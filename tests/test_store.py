@@ -15,14 +15,15 @@ import numpy as np
 import pytest
 from small import command, roadmap, scenario_file, strict_json
 
-from glider_stream import jobs, planner, store
+from glider_stream import jobs, planner
 from glider_stream.base.errors import InputError
 from glider_stream.base.output import check_output, replacing
-from glider_stream.difference import difference
 from glider_stream.kernels.cache import KERNEL_DIGEST
 from glider_stream.kernels.edges import Status
+from glider_stream.roadmap import store
+from glider_stream.roadmap.compare import difference
+from glider_stream.roadmap.store import read_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
-from glider_stream.store import read_roadmap, write_roadmap
 from glider_stream.vehicle.polar import glider_sha256
 from glider_stream.water.inspect import flow_sha256
 

@@ -14,7 +14,7 @@ from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.kernels.terrain import allowed
 from glider_stream.plot.water import sample_water
-from glider_stream.roadmap import build_roadmap, node_positions
+from glider_stream.roadmap.builder import build_roadmap, node_positions
 from glider_stream.scenario import read_scenario
 from glider_stream.water.frame import LocalFrame
 from glider_stream.water.ocean.bathymetry import read_bathymetry

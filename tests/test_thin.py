@@ -15,8 +15,8 @@ from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.query import Planner
+from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
-from glider_stream.store import write_roadmap
 from glider_stream.surfacing import Surfacing, SurfacingPlanner
 from glider_stream.thin import hops_of, thin
 

@@ -10,8 +10,8 @@ import pytest
 from small import command, scenario_file, strict_json
 
 from glider_stream import planner
+from glider_stream.roadmap.verify import SAME, check_edges
 from glider_stream.scenario import scenario_from_text
-from glider_stream.verify import SAME, check_edges
 
 
 @pytest.fixture(scope="module", params=["streamline", "flow-map"])

@@ -12,7 +12,7 @@ from ..path import Path
 from ..water.frame import true_north
 
 if TYPE_CHECKING:
-    from ..roadmap import Problem
+    from ..roadmap.problem import Problem
 
 SHORTEST = 1e-3
 """A step [s] below it is the rest that integration leaves: a speed over it would be noise."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..path import Path
-    from ..roadmap import Problem
+    from ..roadmap.problem import Problem
 
 DEEP = 2.5
 """A seabed so many times deeper than the route would leave no room for the route."""

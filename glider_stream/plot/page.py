@@ -30,7 +30,7 @@ from .water import Frame, frame_of, sample_field
 
 if TYPE_CHECKING:
     from ..path import Path
-    from ..roadmap import Problem
+    from ..roadmap.problem import Problem
 
 PAGE = ".html"
 SCRIPT = ("page-data.js", "page-map.js", "page-profile.js", "page.js")

@@ -14,7 +14,8 @@ from .water import Frame, checked_depths, frame_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..roadmap import Problem, Roadmap
+    from ..roadmap.problem import Problem
+    from ..roadmap.roadmap import Roadmap
 
 MAX_EDGES = 1000
 DIVE, CLIMB = "#3b2a8c", "#f0a04b"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..path import Path
-    from ..roadmap import Problem
+    from ..roadmap.problem import Problem
 
 MAX_MAPS, MAX_NUMBERS, ARROWS = 4, 40, 44
 MAPS_ROOM = 4.9, 5.6  # inches across and up

@@ -10,10 +10,11 @@ from scipy.ndimage import minimum_filter
 from scipy.optimize import root
 
 from ..base.arrays import Array
-from ..edges import Evaluator, FlowMapMethod, Method, StreamlineMethod
 from ..kernels.control import CLIMB, DIVE
 from ..kernels.edges import Status
-from ..neighbours import AllNodes, as_csr
+from ..roadmap.evaluator import Evaluator
+from ..roadmap.neighbours import AllNodes, as_csr
+from ..roadmap.steering import FlowMapMethod, Method, StreamlineMethod
 from .canvas import GREY, INK, colours, frozen, new_figure, styled, thinned, time_unit
 from .scene import draw_current
 from .water import Frame, frame_of
@@ -21,7 +22,7 @@ from .water import Frame, frame_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..roadmap import Problem
+    from ..roadmap.problem import Problem
 
 MESH = (97, 193)
 """Controls of a figure's fan, glide angle by heading."""

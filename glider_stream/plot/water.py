@@ -14,7 +14,7 @@ from ..kernels.terrain import Terrain, allowed
 from .canvas import Side, length_unit
 
 if TYPE_CHECKING:
-    from ..roadmap import Problem
+    from ..roadmap.problem import Problem
 
 
 @entry_point()

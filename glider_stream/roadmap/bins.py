@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernels.patch import MAX_LEVELS, NodeBins
+from ..kernels.patch import MAX_LEVELS, NodeBins
 
 NODES_PER_BIN = 2.0
 

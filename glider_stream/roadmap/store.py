@@ -4,7 +4,7 @@ import contextlib
 import io
 import os
 from collections.abc import Iterator
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.errors import InputError
-from .base.output import replacing
-from .base.settings import require
-from .base.untrusted import check_claim, check_links
-from .kernels.edges import Status
-from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, Tally
+from ..base.errors import InputError
+from ..base.output import replacing
+from ..base.settings import require
+from ..base.untrusted import check_claim, check_links
+from ..kernels.edges import Status
+from .builder import Tally
+from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
+from .shard import Part, Shard
 
-Array = NDArray[Any]
+AnyArray = NDArray[Any]
 FORMAT = "glider-stream/roadmap"
 PART_FORMAT = "glider-stream/roadmap-part"
 VERSION = 1
@@ -40,39 +42,6 @@ _DESCRIBED = {
     "pairs/by_node": ("i4", "1", "pairs of each source node by status, in the order of the attribute `statuses`"),
 }
 _OPTIONAL = {"nodes/lonlat", "pairs/by_node"}
-
-
-@dataclass(frozen=True)
-class Shard:
-    """Part `number`, from 1, of `count` parts of a roadmap."""
-
-    number: int
-    count: int
-
-    @property
-    def whole(self) -> bool:
-        """Whether it is all there is."""
-        return self.count == 1
-
-    def nodes(self, count: int) -> tuple[int, int]:
-        """The first source node, and that after the last, of `count` nodes."""
-        return (self.number - 1) * count // self.count, self.number * count // self.count
-
-    def __str__(self) -> str:
-        return f"{self.number}/{self.count}"
-
-
-@dataclass(frozen=True)
-class Part:
-    """A shard out of its file; `edges` are None where only the head was read."""
-
-    shard: Shard
-    provenance: Provenance
-    position: Array
-    lonlat: Array | None
-    edges: Edges | None
-    wall_s: float
-    threads: int
 
 
 class Guarded(io.FileIO):
@@ -110,8 +79,8 @@ class RoadmapWriter:
         self,
         disk: Guarded,
         file: h5py.File,
-        position: Array,
-        lonlat: Array | None,
+        position: AnyArray,
+        lonlat: AnyArray | None,
         made: Provenance,
         shard: Shard,
     ) -> None:
@@ -119,8 +88,8 @@ class RoadmapWriter:
         self._disk, self._file = disk, file
         self._unit = made.cost_unit
         self._waiting: list[Edges] = []
-        self._degree: list[Array] = []
-        self._counts: list[Array] = []
+        self._degree: list[AnyArray] = []
+        self._counts: list[AnyArray] = []
         file.attrs["format"] = FORMAT if shard.whole else PART_FORMAT
         if not shard.whole:
             file.attrs["shard"] = str(shard)
@@ -165,7 +134,7 @@ class RoadmapWriter:
         self._file.flush()
         self._disk.check()
 
-    def _put(self, name: str, rows: Array) -> None:
+    def _put(self, name: str, rows: AnyArray) -> None:
         """Append rows to a dataset, which is made if there is none."""
         kind, unit, words = _DESCRIBED[name]
         if name in self._file:
@@ -184,7 +153,7 @@ class RoadmapWriter:
 
 @contextlib.contextmanager
 def writing(
-    path: str | Path, position: Array, lonlat: Array | None, made: Provenance, shard: Shard
+    path: str | Path, position: AnyArray, lonlat: AnyArray | None, made: Provenance, shard: Shard
 ) -> Iterator[RoadmapWriter]:
     """A roadmap file in the making; at `path` when the block ends well, and not at all else."""
     with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
@@ -300,9 +269,9 @@ def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
     )
 
 
-def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, Array]:
+def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray]:
     """The datasets by name, of the kind that they should be and no larger than the file can hold."""
-    arrays: dict[str, Array] = {}
+    arrays: dict[str, AnyArray] = {}
     held = path.stat().st_size
     for name in names:
         kind = _DESCRIBED[name][0]
@@ -319,7 +288,7 @@ def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, Array]:
     return arrays
 
 
-def _check_edges(arrays: dict[str, Array], rows: int, path: Path) -> None:
+def _check_edges(arrays: dict[str, AnyArray], rows: int, path: Path) -> None:
     """InputError unless the datasets fit each other: edges of so many rows among the nodes."""
     position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]
     lonlat, counts = arrays.get("nodes/lonlat"), arrays.get("pairs/by_node")

@@ -5,10 +5,11 @@ from typing import Protocol
 
 import numpy as np
 
-from .base.arrays import Array, Index
-from .edges import Evaluator, FlowMapMethod
+from ..base.arrays import Array, Index
+from ..water.inspect import is_steady
+from .evaluator import Evaluator
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
-from .water.inspect import is_steady
+from .steering import FlowMapMethod
 
 SAMPLED = 16
 """Nodes whose pairs are counted before any work is cut."""

@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .base.arrays import Array, Index
-from .base.errors import InputError
-from .base.settings import require
-from .base.threads import in_parallel, threads
-from .edges import Evaluator
-from .kernels.cache import entry_point
-from .kernels.control import glide_speed
-from .kernels.flow import velocities
-from .kernels.motion import rk4_step
-from .query import check_unchanged
-from .roadmap import EDGE_FIELDS, Problem, Roadmap
+from ..base.arrays import Array, Index
+from ..base.errors import InputError
+from ..base.settings import require
+from ..base.threads import in_parallel, threads
+from ..kernels.cache import entry_point
+from ..kernels.control import glide_speed
+from ..kernels.flow import velocities
+from ..kernels.motion import rk4_step
+from .evaluator import Evaluator
+from .problem import Problem
+from .provenance import check_unchanged
+from .roadmap import EDGE_FIELDS, Roadmap
 from .store import read_roadmap
 
 LEGS_AT_ONCE = 10

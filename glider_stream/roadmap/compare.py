@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.settings import require
+from ..base.settings import require
 from .roadmap import EDGE_FIELDS, Roadmap
 
 WORDS = {

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.arrays import Array
-from .base.settings import require
+from ..base.arrays import Array
+from ..base.settings import require
 
 Allowed = Callable[[Array], NDArray[np.bool_]]
 """Which of the points (n, 3) [m] a node may lie at."""

@@ -8,8 +8,8 @@ from typing import Literal, Protocol
 import numpy as np
 from scipy.spatial import KDTree
 
-from .base.arrays import Array, Index
-from .base.settings import require
+from ..base.arrays import Array, Index
+from ..base.settings import require
 
 
 class Neighbourhood(Protocol):

@@ -1,0 +1,1 @@
+"""The roadmap: its nodes and edges, how they are found, its file."""

@@ -1,0 +1,138 @@
+"""How a roadmap is built: nodes, then the pairs of some nodes at a time."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array, Index
+from ..base.settings import require
+from ..base.threads import threads
+from ..kernels.edges import Status
+from .pairs import Legs
+from .problem import Problem
+from .provenance import lonlat_of, provenance_of
+from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
+
+BATCH_PAIRS = 100_000
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a build is: pairs done and in all, connected so far, seconds since it began."""
+
+    done: int
+    total: int
+    connected: int
+    seconds: float
+
+    def __str__(self) -> str:
+        rate = self.done / max(self.seconds, 1e-9)
+        left = (self.total - self.done) / rate if self.done else 0.0 if self.total == 0 else math.inf
+        share = self.connected / max(self.done, 1)
+        so_far = f"{self.done:,} of {self.total:,} pairs, {rate:,.0f} pairs/s"
+        return f"{so_far}, {share:.1%} connected, {left:,.0f} s left"
+
+
+def node_positions(problem: Problem) -> Array:
+    """The scenario's nodes (n, 3) [m]; its start and goal are the last two, where it names them."""
+    sampled = problem.sampler.nodes(
+        problem.lo, problem.hi, lambda points: problem.evaluator.allowed(points, problem.departure)
+    )
+    require(len(sampled) > 0, "the scenario has no node in open water; move the domain or sample more")
+    named = []
+    for name, point in (("query.start", problem.start), ("query.goal", problem.goal)):
+        if point is not None:
+            problem.check_point(point, name)
+            named.append(point)
+    return np.vstack([sampled, *named])
+
+
+def warm_up(problem: Problem) -> None:
+    """Compile the kernels that a build needs, or load them from the disk cache."""
+    problem.legs(problem.lo[None]).of(np.zeros(1, np.int64))
+
+
+def find_edges(
+    problem: Problem, position: Array, source: Index | None = None, batch_pairs: int = BATCH_PAIRS
+) -> Iterator[Edges]:
+    """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
+
+    Neither the number of threads nor the batches change a bit of the result.
+    """
+    require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
+    legs = problem.legs(position)
+    source = np.arange(len(position)) if source is None else source
+    size = max(1, batch_pairs // legs.pairs_per_node)
+    for first in range(0, len(source), size):
+        yield _evaluated(legs, source[first : first + size])
+
+
+def _evaluated(legs: Legs, source: Index) -> Edges:
+    began = time.perf_counter()
+    batch = legs.of(source)
+    status = batch.outcomes[:, 0].astype(np.int64)
+    connected = status == Status.CONNECTED
+    node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
+    counts = np.bincount(node * len(Status) + status, minlength=len(source) * len(Status))
+    by_node: NDArray[np.int32] = counts.reshape(len(source), len(Status)).astype(np.int32)
+    target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, 1:]
+    degree = np.bincount(node[connected], minlength=len(source))
+    return Edges(source, degree, target, values, by_node, time.perf_counter() - began)
+
+
+@dataclass
+class Tally:
+    """What a build of `nodes` has looked at so far: pairs by status, seconds, compilation left out, threads."""
+
+    nodes: int
+    threads: int
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(len(Status), np.int64))
+    seconds: float = 0.0
+    done: int = 0
+
+    def add(self, edges: Edges) -> Progress:
+        """Count some more nodes' pairs; how far that is."""
+        self.counts += edges.counts.sum(axis=0)
+        self.seconds += edges.seconds
+        self.done += edges.source.size
+        looked = int(self.counts.sum())
+        total = looked + round(looked / max(self.done, 1) * (self.nodes - self.done))
+        return Progress(looked, total, int(self.counts[Status.CONNECTED]), self.seconds)
+
+    def by_name(self) -> dict[str, int]:
+        """Pairs by the name of their status, in lower case."""
+        return {status.name.lower(): int(self.counts[status]) for status in Status}
+
+
+def build_roadmap(
+    problem: Problem,
+    thread_count: int | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+    batch_pairs: int = BATCH_PAIRS,
+) -> Roadmap:
+    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk."""
+    position = node_positions(problem)
+    parts: list[Edges] = []
+    with threads(thread_count) as used:
+        warm_up(problem)
+        tally = Tally(len(position), used)
+        for edges in find_edges(problem, position, batch_pairs=batch_pairs):
+            parts.append(edges)
+            progress(tally.add(edges))
+    whole = in_order(parts)
+    return Roadmap(
+        position=position,
+        indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
+        target=whole.target,
+        provenance=provenance_of(problem, position),
+        lonlat=lonlat_of(problem, position),
+        counts=tally.by_name(),
+        wall_s=tally.seconds,
+        threads=used,
+        node_counts=whole.counts,
+        **{name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)},
+    )

@@ -1,0 +1,57 @@
+"""The problem: a scenario made into objects."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.settings import require
+from .evaluator import Evaluator
+from .neighbours import NeighbourLaw, Reachable
+from .nodes import Sampler
+from .pairs import Legs, legs_of
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scenario made into objects: what `build` and `query` need.
+
+    `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
+    x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
+    where known. `flow_words`, `glider_words` say what they are.
+    """
+
+    evaluator: Evaluator
+    sampler: Sampler
+    law: NeighbourLaw | Reachable
+    lo: Array
+    hi: Array
+    departure: float
+    start: Array | None
+    goal: Array | None
+    scenario: str
+    flow_words: str
+    glider_words: str
+    to_lonlat: Callable[[Array], Array] | None = None
+    departs: datetime | None = None
+
+    def check_point(self, point: Array, name: str) -> None:
+        """InputError unless a glider can be at `point` (3,) [m]."""
+        shown, deepest = [*point], f"domain, which ends at z = {self.lo[2]:g} m"
+        if self.to_lonlat is not None and np.isfinite(point).all():
+            shown = [*self.to_lonlat(point[None])[0], 0.0 - point[2]]
+            deepest = f"domain, which ends at a depth of {-self.lo[2]:g} m"
+        said = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
+        require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
+        require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
+        require(bool(point[2] >= self.lo[2]), f"`{name}` = {said} lies below the {deepest}; move it up")
+        inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
+        where = "outside the flow, on land or too near the seabed"
+        require(inside, f"`{name}` = {said} lies {where}; move it into open water")
+
+    def legs(self, position: Array) -> Legs:
+        """How legs among these nodes (n, 3) [m] are found."""
+        volume = float(np.prod(self.hi - self.lo))
+        return legs_of(self.law, self.evaluator, position, volume, self.departure)

@@ -1,0 +1,57 @@
+"""What made a roadmap, and whether that is still what is at hand."""
+
+import hashlib
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.settings import require
+from ..kernels.cache import KERNEL_DIGEST
+from ..vehicle.polar import glider_sha256
+from ..water.inspect import flow_sha256
+from .problem import Problem
+from .roadmap import Provenance, Roadmap
+
+
+def lonlat_of(problem: Problem, position: Array) -> Array | None:
+    """Longitude and latitude [degrees] of nodes (n, 3) [m], where the scenario is geographic."""
+    return None if problem.to_lonlat is None else problem.to_lonlat(position)
+
+
+def provenance_of(problem: Problem, position: Array) -> Provenance:
+    """What a roadmap of this problem, with nodes (n, 3) [m], is made by, now."""
+    return Provenance(
+        scenario=problem.scenario,
+        flow=problem.flow_words,
+        glider=problem.glider_words,
+        scenario_sha256=hashlib.sha256(problem.scenario.encode()).hexdigest(),
+        flow_sha256=flow_sha256(problem.evaluator.flow),
+        terrain_sha256=flow_sha256(problem.evaluator.terrain),
+        glider_sha256=glider_sha256(problem.evaluator.polar),
+        nodes_sha256=hashlib.sha256(np.ascontiguousarray(position, "<f8").tobytes()).hexdigest(),
+        kernel_digest=KERNEL_DIGEST,
+        seed=problem.sampler.seed,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        software_version=version("glider-stream"),
+        cost_unit=problem.evaluator.cost.unit,
+        libraries=", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
+        machine=f"{platform.node()}, {platform.machine()}, Python {platform.python_version()}",
+    )
+
+
+def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
+    """InputError unless flow, terrain and glider are those that the roadmap was built with."""
+    made = roadmap.provenance
+    for name, digest, now in (
+        ("flow", made.flow_sha256, flow_sha256(problem.evaluator.flow)),
+        ("terrain", made.terrain_sha256, flow_sha256(problem.evaluator.terrain)),
+        ("glider", made.glider_sha256, glider_sha256(problem.evaluator.polar)),
+    ):
+        require(
+            digest in ("", now),  # earlier versions of the program did not say the terrain's
+            f"the {name} has changed since the roadmap was built (its digest was {digest[:12]}, it is "
+            f"{now[:12]} now); build the roadmap again",
+        )

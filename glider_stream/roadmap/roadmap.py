@@ -1,0 +1,168 @@
+"""The roadmap: nodes, the legs between them, and how it is built."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array, Index
+from ..kernels.edges import Status
+
+EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What made a roadmap; what a file of an earlier version of the program does not say is empty."""
+
+    scenario: str
+    flow: str
+    glider: str
+    flow_sha256: str
+    glider_sha256: str
+    kernel_digest: str
+    seed: int
+    created: str
+    software_version: str
+    scenario_sha256: str = ""
+    terrain_sha256: str = ""
+    nodes_sha256: str = ""
+    libraries: str = ""
+    machine: str = ""
+    cost_unit: str = "s"
+
+    def identity(self) -> dict[str, str]:
+        """What two roadmaps, or parts of one, must share to hold the same edges."""
+        keys = (
+            "scenario_sha256",
+            "nodes_sha256",
+            "flow_sha256",
+            "terrain_sha256",
+            "glider_sha256",
+            "kernel_digest",
+        )
+        return {key: getattr(self, key) for key in keys}
+
+
+@dataclass(frozen=True)
+class Edges:
+    """What was found from some nodes `source` (n,), rising: the `degree` of each (n,), the edges, the pairs.
+
+    `target` (edges,) rises within a node's; `values` (edges, 6) in the order of EDGE_FIELDS; `counts`
+    (n, statuses) pairs by Status; `seconds` that it took, compilation left out.
+    """
+
+    source: Index
+    degree: Index
+    target: NDArray[np.int32]
+    values: Array
+    counts: NDArray[np.int32]
+    seconds: float = 0.0
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs were looked at."""
+        return int(self.counts.sum())
+
+    def of(self, chosen: NDArray[np.bool_]) -> "Edges":
+        """Those of some of the nodes (n,)."""
+        edges = np.repeat(chosen, self.degree)
+        kept = self.source[chosen], self.degree[chosen], self.target[edges], self.values[edges]
+        return Edges(*kept, self.counts[chosen])
+
+
+def in_order(parts: Sequence[Edges]) -> Edges:
+    """The edges of several sets of nodes as one, by the nodes' numbers."""
+    none: list[NDArray[Any]] = [np.empty((0, *shape), kind) for shape, kind in EMPTY]
+    parts = [Edges(none[0], none[1], none[2], none[3], none[4]), *parts]
+    source, degree = (np.concatenate([getattr(part, name) for part in parts]) for name in ("source", "degree"))
+    nodes = np.argsort(source, kind="stable")
+    edges = np.argsort(np.repeat(source, degree), kind="stable")
+    return Edges(
+        source[nodes],
+        degree[nodes],
+        np.concatenate([part.target for part in parts])[edges],
+        np.concatenate([part.values for part in parts])[edges],
+        np.concatenate([part.counts for part in parts])[nodes],
+        sum(part.seconds for part in parts),
+    )
+
+
+EMPTY = (
+    ((), np.int64),
+    ((), np.int64),
+    ((), np.int32),
+    ((len(EDGE_FIELDS),), np.float64),
+    ((len(Status),), np.int32),
+)
+"""Shapes and types of the arrays of `Edges`."""
+
+
+@dataclass(frozen=True)
+class Roadmap:
+    """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
+
+    `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
+    (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
+    `node_counts` (n, statuses) those of each node, where the file has them.
+    """
+
+    position: Array
+    indptr: Index
+    target: NDArray[np.int32]
+    time: Array
+    cost: Array
+    glide_angle: Array
+    heading: Array
+    speed: Array
+    miss: Array
+    counts: dict[str, int]
+    provenance: Provenance
+    wall_s: float
+    threads: int
+    lonlat: Array | None = None
+    node_counts: NDArray[np.int32] | None = None
+
+    @property
+    def evaluated(self) -> int:
+        """How many pairs were looked at."""
+        return sum(self.counts.values())
+
+    @property
+    def connected_share(self) -> float:
+        """Edges found, as a share of the pairs looked at."""
+        return self.target.size / max(self.evaluated, 1)
+
+    @property
+    def pairs_per_s(self) -> float:
+        """Pairs evaluated per second of wall time, compilation left out."""
+        return self.evaluated / max(self.wall_s, 1e-9)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `info --json` says."""
+        return {
+            "nodes": len(self.position),
+            "edges": self.target.size,
+            "evaluated": self.evaluated,
+            "connected_share": self.connected_share,
+            "counts": self.counts,
+            "pairs_per_s": self.pairs_per_s,
+            "wall_s": self.wall_s,
+            "threads": self.threads,
+            **asdict(self.provenance),
+        }
+
+    def __str__(self) -> str:
+        others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
+        return (
+            f"Roadmap: {len(self.position):,} nodes, {self.target.size:,} edges\n"
+            f"  pairs:  {self.evaluated:,} evaluated, {self.connected_share:.1%} connected ({others})\n"
+            f"  flow:   {self.provenance.flow}\n"
+            f"  glider: {self.provenance.glider}\n"
+            f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
+            f"{self.provenance.created}\n"
+            f"  by:     glider-stream {self.provenance.software_version}"
+            + "".join(f", {words}" for words in (self.provenance.libraries, self.provenance.machine) if words)
+        )

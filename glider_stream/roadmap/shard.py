@@ -1,0 +1,39 @@
+"""Parts of a roadmap, for batch queues."""
+
+from dataclasses import dataclass
+
+from ..base.arrays import Array
+from .roadmap import Edges, Provenance
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part `number`, from 1, of `count` parts of a roadmap."""
+
+    number: int
+    count: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is all there is."""
+        return self.count == 1
+
+    def nodes(self, count: int) -> tuple[int, int]:
+        """The first source node, and that after the last, of `count` nodes."""
+        return (self.number - 1) * count // self.count, self.number * count // self.count
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A shard out of its file; `edges` are None where only the head was read."""
+
+    shard: Shard
+    provenance: Provenance
+    position: Array
+    lonlat: Array | None
+    edges: Edges | None
+    wall_s: float
+    threads: int

@@ -1,0 +1,94 @@
+"""How legs are looked for: steering methods and the integration, as a scenario has them."""
+
+from dataclasses import dataclass
+
+from ..base.checks import LONGEST, WIDEST
+from ..base.settings import require
+from ..kernels import control, motion
+from ..kernels.fan import FlowMap
+
+MAX_CANDIDATES = 1_000_000
+
+MAX_FAN, MAX_GENERATIONS = 1000, 6
+
+
+@dataclass(frozen=True)
+class SurfaceMethod:
+    """The paper's baseline: controls over the whole control surface; `candidates` counts those integrated."""
+
+    candidates: int
+
+    def __post_init__(self) -> None:
+        fits = 1 <= self.candidates <= MAX_CANDIDATES
+        require(fits, f"`steering.candidates` must be from 1 to {MAX_CANDIDATES:,}; got {self.candidates}")
+
+    def kernel(self) -> control.Steering:
+        """As the kernels read it."""
+        return control.Surface(self.candidates)
+
+
+@dataclass(frozen=True)
+class StreamlineMethod(SurfaceMethod):
+    """The paper's method: controls on the control line.
+
+    With `refine`, those that land nearest are first guesses of exact legs, polished as the flow map's are.
+    """
+
+    refine: bool = False
+
+    def kernel(self) -> control.Steering:
+        """As the kernels read it."""
+        return control.Streamline(self.candidates)
+
+
+@dataclass(frozen=True)
+class FlowMapMethod:
+    """Exact steering: every connection that there is, by the flow map of each source node.
+
+    `fan` = [glide angles, headings] of the coarsest mesh over the controls of a node; its cells are halved
+    once, and up to `generations` times more where they are bent or folded, so that little depends on either.
+    """
+
+    fan: tuple[int, int] = (6, 12)
+    generations: int = 3
+
+    def __post_init__(self) -> None:
+        fits = 2 <= self.fan[0] <= MAX_FAN and 4 <= self.fan[1] <= MAX_FAN
+        require(fits, f"`steering.fan` must be from [2, 4] to [{MAX_FAN}, {MAX_FAN}]; got {list(self.fan)}")
+        fits = 0 <= self.generations <= MAX_GENERATIONS
+        require(fits, f"`steering.generations` must be from 0 to {MAX_GENERATIONS}; got {self.generations}")
+
+    def kernel(self) -> FlowMap:
+        """As the kernels read it."""
+        return FlowMap(*self.fan, self.generations)
+
+
+Method = SurfaceMethod | StreamlineMethod | FlowMapMethod
+
+METHODS: dict[str, type[Method]] = {
+    "streamline": StreamlineMethod,
+    "surface": SurfaceMethod,
+    "flow-map": FlowMapMethod,
+}
+
+
+@dataclass(frozen=True)
+class IntegrationSettings:
+    """`steps` RK4 steps of `dt` [s] make the horizon; a miss below `tolerance` [m] is a hit."""
+
+    dt: float
+    steps: int
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        require(self.dt > 0, f"`integration.dt` must be above 0 s; got {self.dt:g}")
+        require(self.steps >= 1, f"`integration.steps` must be at least 1; got {self.steps}")
+        horizon, most = self.dt * self.steps, f"{LONGEST:g} s, 30 years"
+        require(horizon <= LONGEST, f"`integration.dt` times `steps` must be at most {most}; got {horizon:g} s")
+        require(self.tolerance > 0, f"`integration.tolerance` must be above 0 m; got {self.tolerance:g}")
+        fits = self.tolerance <= WIDEST
+        require(fits, f"`integration.tolerance` must be {WIDEST:g} m at most; got {self.tolerance:g}")
+
+    def kernel(self) -> motion.Integration:
+        """As the kernels read it."""
+        return motion.Integration(self.dt, self.steps, self.tolerance)
