@@ -21,11 +21,11 @@ from scipy.stats import t as student
 
 from glider_stream.kernels.cache import KERNEL_DIGEST
 from glider_stream.plot import Mean, Series
-from glider_stream.query import Planner
 from glider_stream.roadmap.builder import build_roadmap
 from glider_stream.roadmap.problem import Problem
 from glider_stream.roadmap.steering import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
 from glider_stream.scenario import scenario_from_table, shipped_scenarios
+from glider_stream.search.query import Planner
 from glider_stream.water.analytic import Vortex, Vortices
 from glider_stream.water.sampled import sample_flow
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numba
 
-from glider_stream.query import Planner
 from glider_stream.roadmap.builder import build_roadmap
 from glider_stream.scenario import read_scenario
+from glider_stream.search.query import Planner
 
 SAMPLED = [(method, candidates) for candidates in (16, 54) for method in ("streamline", "surface")]
 CASES = [(law, *case) for law in ("nearest", "all") for case in (*SAMPLED, ("flow-map", None))]

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from .kernels.flow import velocities
-from .path import Leg, Path
 from .roadmap.problem import Problem
-from .waypoints import SURFACE
+from .search.path import SURFACE, Leg, Path
 
 DAY = 86_400.0
 

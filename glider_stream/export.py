@@ -16,8 +16,8 @@ from xml.etree import ElementTree as Xml
 
 from .base.output import check_output, replacing
 from .base.settings import require
-from .path import Leg, Path
 from .seaglider import targets
+from .search.path import Leg, Path
 from .slocum import list_number, mission_files
 from .water.frame import wrapped
 from .windows import HOURS, Window, windows

@@ -18,8 +18,6 @@ from .drawn import read_drawn
 from .export import check_export, export_path
 from .jobs import Job, build_file, shard_of
 from .jobs import merge as merge_parts
-from .path import Path, load_path
-from .query import Planner
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
@@ -28,12 +26,13 @@ from .roadmap.store import read_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .score import Score
 from .score import score as score_of
-from .surfacing import Surfacing, SurfacingPlanner
-from .thin import thin as thinned
-from .trade_off import TradeOff
-from .trade_off import trade_off as find_trade_off
+from .search.path import SURFACE, Path, load_path
+from .search.query import Planner
+from .search.surfacing import Surfacing, SurfacingPlanner
+from .search.thin import thin as thinned
+from .search.trade_off import TradeOff
+from .search.trade_off import trade_off as find_trade_off
 from .water.domain import GeographicDomain, Point
-from .waypoints import SURFACE
 from .windows import HOURS
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import Any
 
 from .base.arrays import Array
 from .kernels.edges import Edge, Status
-from .path import Path
-from .thin import Hop, hops_of
+from .search.path import Hop, Path, hops_of
 
 REASONS = {
     Status.CURRENT_TOO_STRONG: "the current across it is stronger than the vehicle; go round, or with it",

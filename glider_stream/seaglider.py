@@ -1,7 +1,7 @@
 """Seaglider's `targets` file: a route's waypoints, each naming the next."""
 
 from .base.settings import require
-from .path import Path
+from .search.path import Path
 from .water.frame import wrapped
 from .waypoints import degrees_and_minutes, waypoints
 

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from .base.settings import require
-from .path import Path
+from .search.path import Path
 from .water.frame import wrapped
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 

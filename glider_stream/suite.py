@@ -17,13 +17,13 @@ from .baselines import BASELINES
 from .bench import made_by
 from .brute_force import fastest_legs
 from .kernels.edges import Status
-from .query import Planner
 from .roadmap.builder import build_roadmap
 from .roadmap.neighbours import Reachable
 from .roadmap.nodes import SobolSampler
 from .roadmap.problem import Problem
 from .roadmap.steering import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
 from .scenario import read_scenario
+from .search.query import Planner
 
 METHODS: dict[str, Method] = {
     "flow-map": FlowMapMethod(),

@@ -3,10 +3,7 @@
 from dataclasses import dataclass
 
 from .base.settings import require
-from .path import Path
-
-SURFACE = 10.0
-"""A leg that ends no deeper [m] ends at the surface."""
+from .search.path import SURFACE, Path
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .base.settings import require
-from .path import Path
+from .search.path import Path
 from .water.frame import wrapped
 
 HOURS = 12.0

@@ -13,14 +13,14 @@ from test_plot import arrivals, box_scene, ocean_scene
 from glider_stream import planner, plot
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.terrain import OpenWater, Seabed
-from glider_stream.path import Leg, Path
 from glider_stream.plot.fronts import front_times
 from glider_stream.plot.graticule import draw_graticule, named, round_degrees
 from glider_stream.plot.seabed import known_until, without_clearance
 from glider_stream.plot.water import frame_of
-from glider_stream.query import Planner
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
+from glider_stream.search.path import Leg, Path
+from glider_stream.search.query import Planner
 from glider_stream.water.frame import LocalFrame
 
 

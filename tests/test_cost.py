@@ -11,10 +11,10 @@ from small import command, roadmap, scenario_file, strict_json
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.cost import edge_cost
-from glider_stream.query import Blend, Planner
 from glider_stream.roadmap.roadmap import Roadmap
 from glider_stream.scenario import read_scenario
-from glider_stream.trade_off import trade_off
+from glider_stream.search.query import Blend, Planner
+from glider_stream.search.trade_off import trade_off
 from glider_stream.vehicle.cost import GRAVITY, PRESETS, Energy, TravelTime
 
 ENERGY = [
@@ -90,7 +90,7 @@ def every_path(road: Roadmap, start, goal):
 def test_no_path_is_cheaper_and_no_corner_is_missing(tmp_path, monkeypatch, seed):
     problem = read_scenario(scenario_file(tmp_path), SETS).problem()
     road = random_roadmap(seed)
-    monkeypatch.setattr("glider_stream.query.check_unchanged", lambda *_: None)
+    monkeypatch.setattr("glider_stream.search.query.check_unchanged", lambda *_: None)
     search = Planner(road, problem)
     every = every_path(road, 0, len(road.position) - 1)
     ends = road.position[0], road.position[-1]

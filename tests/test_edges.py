@@ -23,13 +23,13 @@ from glider_stream.kernels.edges import Status
 from glider_stream.kernels.flow import velocity
 from glider_stream.kernels.motion import traced
 from glider_stream.kernels.terrain import Seabed, allowed
-from glider_stream.query import Planner
 from glider_stream.roadmap.builder import build_roadmap
 from glider_stream.roadmap.neighbours import Nearest
 from glider_stream.roadmap.nodes import RandomSampler
 from glider_stream.roadmap.problem import Problem
 from glider_stream.roadmap.roadmap import EDGE_FIELDS
 from glider_stream.roadmap.steering import IntegrationSettings, StreamlineMethod, SurfaceMethod
+from glider_stream.search.query import Planner
 from glider_stream.water.analytic import Uniform, Vortex, Vortices
 from glider_stream.water.sampled import sample_flow
 

@@ -13,7 +13,7 @@ import pytest
 
 from glider_stream.base.errors import InputError
 from glider_stream.export import ANYWHERE, EXPORTS, export_path
-from glider_stream.path import Leg, Path
+from glider_stream.search.path import Leg, Path
 from glider_stream.slocum import goto_list, lint, mission_files
 from glider_stream.water.frame import LocalFrame
 from glider_stream.waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints

@@ -16,9 +16,9 @@ FLOORS = {
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine base",
     4: "brute_force water water vehicle",
-    6: "path waypoints windows drawn roadmap",
-    7: "journal query change",
-    8: "slocum seaglider export plot cluster jobs baselines surfacing trade_off card thin score",
+    6: "waypoints windows drawn roadmap search",
+    7: "journal change",
+    8: "slocum seaglider export plot cluster jobs baselines card score",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

@@ -23,9 +23,9 @@ from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped
 from glider_stream.drawn import read_drawn
 from glider_stream.jobs import Job, Shard, build_file, merge
-from glider_stream.path import load_path
 from glider_stream.roadmap.store import read_part, read_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario
+from glider_stream.search.path import load_path
 from glider_stream.vehicle.calibration.calibrate import calibrate
 from glider_stream.vehicle.calibration.dives import read_dives
 from glider_stream.water.frame import LocalFrame

@@ -19,10 +19,10 @@ from glider_stream.drawn import read_drawn
 from glider_stream.export import export_path
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.kernels.flow import velocity
-from glider_stream.query import Planner
 from glider_stream.scenario import scenario_from_text
 from glider_stream.score import REASONS
-from glider_stream.thin import thin
+from glider_stream.search.query import Planner
+from glider_stream.search.thin import thin
 from glider_stream.water.frame import LocalFrame
 from glider_stream.windows import windows
 

@@ -16,9 +16,9 @@ from glider_stream import plot
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.flow import OceanGrid, Vortices, velocity
 from glider_stream.kernels.terrain import OpenWater, Seabed, allowed
-from glider_stream.path import Leg, Path
 from glider_stream.roadmap.builder import node_positions
 from glider_stream.scenario import scenario_from_table
+from glider_stream.search.path import Leg, Path
 
 UNIT = re.compile(r"\((m|km|s|min|h|days|m/s|°|degrees|count)\)")
 SIGNATURES = {".png": b"\x89PNG\r\n\x1a\n", ".svg": b"<?xml", ".pdf": b"%PDF-"}

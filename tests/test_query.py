@@ -11,10 +11,10 @@ from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.export import EXPORTS
 from glider_stream.kernels.edges import Status
-from glider_stream.path import load_path
-from glider_stream.query import Planner
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
+from glider_stream.search.path import load_path
+from glider_stream.search.query import Planner
 
 START, GOAL = (-190.0, 190.0, 0.0), (160.0, -160.0, 0.0)
 PAIRS = [

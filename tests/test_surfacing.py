@@ -8,10 +8,10 @@ from small import command, roadmap, scenario_file, strict_json
 from test_cost import random_roadmap
 
 from glider_stream.base.errors import InputError
-from glider_stream.query import Planner
 from glider_stream.scenario import read_scenario
-from glider_stream.surfacing import BINS, Surfacing, SurfacingPlanner
-from glider_stream.waypoints import SURFACE
+from glider_stream.search.path import SURFACE
+from glider_stream.search.query import Planner
+from glider_stream.search.surfacing import BINS, Surfacing, SurfacingPlanner
 
 
 def keeps(rule, legs, slack=0.0):
@@ -55,7 +55,7 @@ RULES = [Surfacing(1), Surfacing(2), Surfacing(None, 0.12), Surfacing(None, 0.25
 def test_no_path_that_keeps_the_rule_is_faster(tmp_path, monkeypatch, seed, rule):
     road = random_roadmap(seed, nodes=6)
     road.position[[0, -1], 2] = 0.0
-    monkeypatch.setattr("glider_stream.query.check_unchanged", lambda *_: None)
+    monkeypatch.setattr("glider_stream.search.query.check_unchanged", lambda *_: None)
     problem = read_scenario(scenario_file(tmp_path)).problem()
     ends = road.position[0], road.position[-1]
     found = SurfacingPlanner(road, problem, rule).query(*ends)

@@ -14,11 +14,12 @@ from test_export import route
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
-from glider_stream.query import Planner
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
-from glider_stream.surfacing import Surfacing, SurfacingPlanner
-from glider_stream.thin import hops_of, thin
+from glider_stream.search.path import hops_of
+from glider_stream.search.query import Planner
+from glider_stream.search.surfacing import Surfacing, SurfacingPlanner
+from glider_stream.search.thin import thin
 
 GOOD = Edge(int(Status.CONNECTED), 10.0, 10.0, -0.4, 0.0, 0.4, 0.0)
 

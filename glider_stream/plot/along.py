@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..path import Path
+from ..search.path import Path
 from ..water.frame import true_north
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..path import Path
     from ..roadmap.problem import Problem
+    from ..search.path import Path
 
 DEEP = 2.5
 """A seabed so many times deeper than the route would leave no room for the route."""

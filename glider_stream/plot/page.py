@@ -29,8 +29,8 @@ from .seabed import known_until, sample_bottom
 from .water import Frame, frame_of, sample_field
 
 if TYPE_CHECKING:
-    from ..path import Path
     from ..roadmap.problem import Problem
+    from ..search.path import Path
 
 PAGE = ".html"
 SCRIPT = ("page-data.js", "page-map.js", "page-profile.js", "page.js")

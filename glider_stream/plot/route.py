@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..path import Path
     from ..roadmap.problem import Problem
+    from ..search.path import Path
 
 MAX_MAPS, MAX_NUMBERS, ARROWS = 4, 40, 44
 MAPS_ROOM = 4.9, 5.6  # inches across and up

@@ -6,12 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.settings import require
-from .kernels.edges import Edge, Status
-from .path import Path
-
-Hop = tuple[Array, Array, Edge]
+from ..base.arrays import Array
+from ..base.settings import require
+from ..kernels.edges import Edge, Status
+from .path import Hop, Path, hops_of
 
 
 def thin(
@@ -53,19 +51,9 @@ def thin(
     return replace(fly(hops), unthinned=(len(old), path.travel_time))
 
 
-def hops_of(path: Path) -> list[Hop]:
-    """The legs of a path as `fly` takes them."""
-    return [(leg.start, leg.end, _edge(path, n)) for n, leg in enumerate(path.legs)]
-
-
 def _distances(points: Array, start: Array, end: Array) -> Array:
     """Of points (n, 3) from the line between two others [m]."""
     way = end - start
     length = float(way @ way)
     share = np.clip((points - start) @ way / length, 0, 1)[:, None] if length > 0 else np.zeros((len(points), 1))
     return np.asarray(np.linalg.norm(points - (start + share * way), axis=1))
-
-
-def _edge(path: Path, n: int) -> Edge:
-    leg = path.legs[n]
-    return Edge(int(Status.CONNECTED), leg.duration, leg.cost, leg.glide_angle, leg.heading, leg.speed, leg.miss)

@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from .base.arrays import Array, Index
-from .base.settings import require
-from .kernels.edges import Edge, Status
+from ..base.arrays import Array, Index
+from ..base.settings import require
+from ..kernels.edges import Edge, Status
+from ..roadmap.pairs import Attached, Legs
+from ..roadmap.problem import Problem
+from ..roadmap.provenance import check_unchanged
+from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
+from ..water.frame import true_north
 from .path import Leg, Path
-from .roadmap.pairs import Attached, Legs
-from .roadmap.problem import Problem
-from .roadmap.provenance import check_unchanged
-from .roadmap.roadmap import EDGE_FIELDS, Roadmap
-from .water.frame import true_north
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1

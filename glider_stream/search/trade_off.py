@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .base.settings import require
+from ..base.settings import require
 from .path import Path
 from .query import Blend
 

@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base.arrays import Array, Index
-from .base.settings import require
-from .kernels.edges import Status
-from .path import Path
+from ..base.arrays import Array, Index
+from ..base.settings import require
+from ..kernels.edges import Status
+from ..roadmap.pairs import Attached, Legs
+from ..roadmap.problem import Problem
+from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
+from .path import SURFACE, Path
 from .query import End, Planner
-from .roadmap.pairs import Attached, Legs
-from .roadmap.problem import Problem
-from .roadmap.roadmap import EDGE_FIELDS, Roadmap
-from .waypoints import SURFACE
 
 BINS = 48
 """Parts of the longest time under water that are told apart; a leg's is rounded up, so the rule always holds."""

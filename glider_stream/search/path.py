@@ -9,14 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.errors import InputError
-from .base.settings import require
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.settings import require
+from ..kernels.edges import Edge, Status
 
 MOST_TEXT = 200_000_000
 """The most that a path file may hold [bytes]; a route of a thousand legs has some five million."""
 LARGEST = 1e12
 """A number [m, s] in a path file beyond it is no place or time on Earth."""
+SURFACE = 10.0
+"""A leg that ends no deeper [m] ends at the surface."""
+Hop = tuple[Array, Array, Edge]
+"""A leg as searches have it: from, to (3,) [m], and the edge between them."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +148,20 @@ class Path:
         if self.unthinned is not None:
             title += f"; before it was thinned {self.unthinned[0]}, {self.unthinned[1]:,.0f} s"
         return "\n".join([title, *(f"  {leg}" for leg in self.legs)])
+
+
+def hops_of(path: Path) -> list[Hop]:
+    """The legs of a path as `fly` takes them."""
+    return [
+        (
+            leg.start,
+            leg.end,
+            Edge(
+                int(Status.CONNECTED), leg.duration, leg.cost, leg.glide_angle, leg.heading, leg.speed, leg.miss
+            ),
+        )
+        for leg in path.legs
+    ]
 
 
 def load_path(file: str | File) -> Path:

@@ -1,0 +1,1 @@
+"""Routes over a roadmap: queries, paths, rules of surfacing, time against energy."""
