@@ -16,8 +16,8 @@ from .card import Card
 from .card import card as card_of
 from .drawn import read_drawn
 from .export import check_export, export_path
-from .jobs import Job, build_file, shard_of
-from .jobs import merge as merge_parts
+from .jobs.build import Job, build_file, shard_of
+from .jobs.build import merge as merge_parts
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
@@ -94,7 +94,7 @@ def _build(
     address, older = job.pop("scheduler", None), job.pop("base", None)
     problem = scenario.problem()
     if older is not None:
-        from .change import untouched
+        from .jobs.reuse import untouched
 
         road = info(older)
         before = scenario_from_text(road.provenance.scenario).problem()
@@ -103,7 +103,7 @@ def _build(
     if address is None:
         build_file(problem, output, threads, progress, job=Job(**job))
         return
-    from .cluster import scheduler
+    from .jobs.cluster import scheduler
 
     with scheduler(address) as cluster:
         job |= {"finder": cluster.find_edges, "warm": False}

@@ -9,7 +9,7 @@ from test_jobs import datasets
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.change import untouched
+from glider_stream.jobs.reuse import untouched
 from glider_stream.scenario import read_scenario
 
 xr = pytest.importorskip("xarray")

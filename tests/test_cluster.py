@@ -8,9 +8,9 @@ import pytest
 from small import command, scenario_file
 from test_jobs import BATCH, METHODS, datasets, expected, problem
 
-from glider_stream import cluster
 from glider_stream.base.errors import InputError
-from glider_stream.jobs import Job, build_file
+from glider_stream.jobs import cluster
+from glider_stream.jobs.build import Job, build_file
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")  # what dask says while its workers die is its own

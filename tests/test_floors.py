@@ -17,8 +17,8 @@ FLOORS = {
     " kernels.refine base",
     4: "brute_force water water vehicle",
     6: "waypoints windows drawn roadmap search",
-    7: "journal change",
-    8: "slocum seaglider export plot cluster jobs baselines card score",
+    7: "jobs",
+    8: "slocum seaglider export plot baselines card score",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

@@ -16,9 +16,11 @@ import numpy as np
 import pytest
 from small import command, executable, scenario_file
 
-from glider_stream import jobs, journal, planner
+from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped
-from glider_stream.jobs import Job, Shard, build_file, merge, shard_of
+from glider_stream.jobs import build as jobs
+from glider_stream.jobs import journal
+from glider_stream.jobs.build import Job, Shard, build_file, merge, shard_of
 from glider_stream.kernels.edges import Status
 from glider_stream.roadmap import roadmap, store
 from glider_stream.roadmap.builder import build_roadmap, find_edges

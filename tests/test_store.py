@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 from small import command, roadmap, scenario_file, strict_json
 
-from glider_stream import jobs, planner
+from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.base.output import check_output, replacing
+from glider_stream.jobs import build as jobs
 from glider_stream.kernels.cache import KERNEL_DIGEST
 from glider_stream.kernels.edges import Status
 from glider_stream.roadmap import store

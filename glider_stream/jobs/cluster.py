@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.arrays import Array, Index
-from .base.errors import InputError
-from .base.settings import require
-from .base.threads import threads
-from .kernels.cache import KERNEL_DIGEST
-from .roadmap.builder import find_edges, warm_up
-from .roadmap.problem import Problem
-from .roadmap.roadmap import Edges
+from ..base.arrays import Array, Index
+from ..base.errors import InputError
+from ..base.settings import require
+from ..base.threads import threads
+from ..kernels.cache import KERNEL_DIGEST
+from ..roadmap.builder import find_edges, warm_up
+from ..roadmap.problem import Problem
+from ..roadmap.roadmap import Edges
 
 AHEAD = 4
 """Chunks that wait at the scheduler for each thread of a worker."""

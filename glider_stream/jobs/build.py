@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .base.arrays import Array, Index
-from .base.errors import InputError, Stopped, Unwritable
-from .base.lock import locked
-from .base.output import check_output
-from .base.settings import require
-from .base.threads import threads
+from ..base.arrays import Array, Index
+from ..base.errors import InputError, Stopped, Unwritable
+from ..base.lock import locked
+from ..base.output import check_output
+from ..base.settings import require
+from ..base.threads import threads
+from ..roadmap.builder import BATCH_PAIRS, Progress, Tally, find_edges, node_positions, warm_up
+from ..roadmap.problem import Problem
+from ..roadmap.provenance import lonlat_of, provenance_of
+from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
+from ..roadmap.shard import Shard
+from ..roadmap.store import read_part, writing
 from .journal import Journal
-from .roadmap.builder import BATCH_PAIRS, Progress, Tally, find_edges, node_positions, warm_up
-from .roadmap.problem import Problem
-from .roadmap.provenance import lonlat_of, provenance_of
-from .roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
-from .roadmap.shard import Shard
-from .roadmap.store import read_part, writing
 
 Finder = Callable[[Problem, Array, Index, int], Iterator[Edges]]
 CHECKPOINT = 30.0

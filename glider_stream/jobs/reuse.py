@@ -8,16 +8,16 @@ from scipy.ndimage import distance_transform_edt, map_coordinates, maximum_filte
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from .base.arrays import Array, Bools
-from .base.settings import require
-from .kernels.flow import Flow, Grid, OceanGrid
-from .kernels.terrain import Seabed
-from .roadmap.builder import node_positions
-from .roadmap.pairs import NeighbourLegs
-from .roadmap.problem import Problem
-from .roadmap.provenance import provenance_of
-from .roadmap.roadmap import Roadmap
-from .roadmap.steering import FlowMapMethod
+from ..base.arrays import Array, Bools
+from ..base.settings import require
+from ..kernels.flow import Flow, Grid, OceanGrid
+from ..kernels.terrain import Seabed
+from ..roadmap.builder import node_positions
+from ..roadmap.pairs import NeighbourLegs
+from ..roadmap.problem import Problem
+from ..roadmap.provenance import provenance_of
+from ..roadmap.roadmap import Roadmap
+from ..roadmap.steering import FlowMapMethod
 
 SIDE = 480
 """Cells along the longer side of the lattice that times are bounded on."""

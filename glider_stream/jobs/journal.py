@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from .base.errors import InputError
-from .roadmap.roadmap import EMPTY, Edges
+from ..base.errors import InputError
+from ..roadmap.roadmap import EMPTY, Edges
 
 MAGIC = b"glider-stream/journal 1\n"
 RECORD = struct.Struct("<4sQQd")

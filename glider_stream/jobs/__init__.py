@@ -1,0 +1,1 @@
+"""Long builds: files that survive being killed, shards, clusters, reuse after a change."""
