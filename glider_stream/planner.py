@@ -12,20 +12,21 @@ import numpy as np
 from .base.arrays import Array
 from .base.output import check_output, replacing
 from .base.settings import require
-from .card import Card
-from .card import card as card_of
-from .drawn import read_drawn
-from .export import check_export, export_path
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
+from .pilot.card import Card
+from .pilot.card import card as card_of
+from .pilot.export import check_export, export_path
+from .pilot.route_files import read_drawn
+from .pilot.score import Score
+from .pilot.score import score as score_of
+from .pilot.windows import HOURS
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
-from .score import Score
-from .score import score as score_of
 from .search.path import SURFACE, Path, load_path
 from .search.query import Planner
 from .search.surfacing import Surfacing, SurfacingPlanner
@@ -33,7 +34,6 @@ from .search.thin import thin as thinned
 from .search.trade_off import TradeOff
 from .search.trade_off import trade_off as find_trade_off
 from .water.domain import GeographicDomain, Point
-from .windows import HOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ import pytest
 from small import command, roadmap, strict_json
 from test_export import route
 
-from glider_stream.card import card
+from glider_stream.pilot.card import card
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.water.analytic import Uniform
 

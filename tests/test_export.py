@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from glider_stream.base.errors import InputError
-from glider_stream.export import ANYWHERE, EXPORTS, export_path
+from glider_stream.pilot.export import ANYWHERE, EXPORTS, export_path
+from glider_stream.pilot.slocum import goto_list, lint, mission_files
+from glider_stream.pilot.waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 from glider_stream.search.path import Leg, Path
-from glider_stream.slocum import goto_list, lint, mission_files
 from glider_stream.water.frame import LocalFrame
-from glider_stream.waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 FRAME = LocalFrame(lon=18.5, lat=38.0)
 DEPARTS = datetime(2024, 11, 20, 12, 0, 0, tzinfo=UTC)

@@ -16,9 +16,9 @@ FLOORS = {
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine base",
     4: "brute_force water water vehicle",
-    6: "waypoints windows drawn roadmap search",
+    6: "roadmap search",
     7: "jobs",
-    8: "slocum seaglider export plot baselines card score",
+    8: "plot baselines pilot",
     9: "scenario bench suite planner cli",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}

@@ -21,8 +21,8 @@ from test_jobs import interrupt, problem
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped
-from glider_stream.drawn import read_drawn
 from glider_stream.jobs.build import Job, Shard, build_file, merge
+from glider_stream.pilot.route_files import read_drawn
 from glider_stream.roadmap.store import read_part, read_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario
 from glider_stream.search.path import load_path

@@ -14,17 +14,17 @@ from test_export import DEPARTS, FRAME, STOPS, route
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.card import card
-from glider_stream.drawn import read_drawn
-from glider_stream.export import export_path
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.kernels.flow import velocity
+from glider_stream.pilot.card import card
+from glider_stream.pilot.export import export_path
+from glider_stream.pilot.route_files import read_drawn
+from glider_stream.pilot.score import REASONS
+from glider_stream.pilot.windows import windows
 from glider_stream.scenario import scenario_from_text
-from glider_stream.score import REASONS
 from glider_stream.search.query import Planner
 from glider_stream.search.thin import thin
 from glider_stream.water.frame import LocalFrame
-from glider_stream.windows import windows
 
 gpxpy, kml, shapely = (pytest.importorskip(name) for name in ("gpxpy", "fastkml.kml", "shapely"))
 

@@ -9,8 +9,8 @@ from small import SCENARIO, TOLERANCE, K, distance, roadmap, scenario_file, stri
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.export import EXPORTS
 from glider_stream.kernels.edges import Status
+from glider_stream.pilot.export import EXPORTS
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
 from glider_stream.search.path import load_path

@@ -10,12 +10,12 @@ import pytest
 from test_ocean import IONIAN, WASHINGTON, real
 
 from glider_stream import planner
-from glider_stream.export import export_path
+from glider_stream.pilot.export import export_path
+from glider_stream.pilot.slocum import lint
+from glider_stream.pilot.waypoints import from_degrees_and_minutes, waypoints
 from glider_stream.roadmap.verify import verify
 from glider_stream.scenario import read_scenario
 from glider_stream.search.path import SURFACE
-from glider_stream.slocum import lint
-from glider_stream.waypoints import from_degrees_and_minutes, waypoints
 
 gpxpy, kml, shapely, pyproj = (
     pytest.importorskip(name) for name in ("gpxpy", "fastkml.kml", "shapely", "pyproj")

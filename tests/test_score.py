@@ -14,13 +14,13 @@ from test_export import FRAME, STOPS, route
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.drawn import FORMS, MOST_TEXT, read_drawn
-from glider_stream.export import export_path
 from glider_stream.kernels.edges import Edge, Status
+from glider_stream.pilot.export import export_path
+from glider_stream.pilot.route_files import FORMS, MOST_TEXT, read_drawn
+from glider_stream.pilot.score import REASONS, score
 from glider_stream.roadmap.steering import SurfaceMethod
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
-from glider_stream.score import REASONS, score
 from glider_stream.search.query import Planner
 
 

@@ -13,12 +13,12 @@ from test_export import FRAME, STOPS, route
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.export import export_path
+from glider_stream.pilot.export import export_path
+from glider_stream.pilot.windows import windows
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
 from glider_stream.search.query import Planner
 from glider_stream.water.frame import LocalFrame
-from glider_stream.windows import windows
 
 ACROSS = LocalFrame(lon=180.0, lat=-20.0)
 SAGITTA = 0.3

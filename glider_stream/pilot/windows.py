@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .base.settings import require
-from .search.path import Path
-from .water.frame import wrapped
+from ..base.settings import require
+from ..search.path import Path
+from ..water.frame import wrapped
 
 HOURS = 12.0
 """A window, unless said otherwise."""

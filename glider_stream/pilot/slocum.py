@@ -9,9 +9,9 @@ import re
 
 import numpy as np
 
-from .base.settings import require
-from .search.path import Path
-from .water.frame import wrapped
+from ..base.settings import require
+from ..search.path import Path
+from ..water.frame import wrapped
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 MOST_WAYPOINTS = 8

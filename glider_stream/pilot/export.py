@@ -14,12 +14,12 @@ from pathlib import Path as File
 from typing import Any
 from xml.etree import ElementTree as Xml
 
-from .base.output import check_output, replacing
-from .base.settings import require
+from ..base.output import check_output, replacing
+from ..base.settings import require
+from ..search.path import Leg, Path
+from ..water.frame import wrapped
 from .seaglider import targets
-from .search.path import Leg, Path
 from .slocum import list_number, mission_files
-from .water.frame import wrapped
 from .windows import HOURS, Window, windows
 
 Texts = dict[str, str]

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Xml
 
-from .base.errors import InputError
-from .base.settings import require
+from ..base.errors import InputError
+from ..base.settings import require
 
 Place = tuple[float, float, float]
 MOST_TEXT, MOST_POINTS = 20_000_000, 10_000

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .kernels.flow import velocities
-from .roadmap.problem import Problem
-from .search.path import SURFACE, Leg, Path
+from ..kernels.flow import velocities
+from ..roadmap.problem import Problem
+from ..search.path import SURFACE, Leg, Path
 
 DAY = 86_400.0
 

@@ -1,8 +1,8 @@
 """Seaglider's `targets` file: a route's waypoints, each naming the next."""
 
-from .base.settings import require
-from .search.path import Path
-from .water.frame import wrapped
+from ..base.settings import require
+from ..search.path import Path
+from ..water.frame import wrapped
 from .waypoints import degrees_and_minutes, waypoints
 
 RADIUS = 200

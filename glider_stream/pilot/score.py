@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from .base.arrays import Array
-from .kernels.edges import Edge, Status
-from .search.path import Hop, Path, hops_of
+from ..base.arrays import Array
+from ..kernels.edges import Edge, Status
+from ..search.path import Hop, Path, hops_of
 
 REASONS = {
     Status.CURRENT_TOO_STRONG: "the current across it is stronger than the vehicle; go round, or with it",

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from .base.settings import require
-from .search.path import SURFACE, Path
+from ..base.settings import require
+from ..search.path import SURFACE, Path
 
 
 @dataclass(frozen=True)

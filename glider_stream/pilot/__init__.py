@@ -1,0 +1,1 @@
+"""What pilots work with: files for vehicles and maps, the card, windows, scores of drawn routes."""
