@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from completeness_fields import BEYOND, fields
 
-from glider_stream import brute_force
+from glider_stream.evaluation import brute_force
 from glider_stream.kernels.edges import Status
 from glider_stream.kernels.flow import Grid
 from glider_stream.roadmap.evaluator import Evaluator

@@ -27,7 +27,7 @@ METHODS = {
     "flow-map": ["steering.method=flow-map", "neighbours.kind=all"],
     "reachable": ["steering.method=flow-map", "neighbours.kind=reachable", "neighbours.limit=64"],
 }
-SMALL = "import glider_stream.roadmap as r, glider_stream.jobs as j; r.BATCH_PAIRS = 1000; "
+SMALL = "import glider_stream.roadmap.builder as r, glider_stream.jobs.build as j; r.BATCH_PAIRS = 1000; "
 PROGRAM = SMALL + (
     "j.build_file.__defaults__ = tuple(1000 if d == 100_000 else d for d in j.build_file.__defaults__); "
     "from glider_stream.cli import main; main()"

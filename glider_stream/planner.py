@@ -38,9 +38,9 @@ from .water.domain import GeographicDomain, Point
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .bench import Record
+    from .evaluation.bench import Record
+    from .evaluation.suite import Report
     from .roadmap.verify import Verification
-    from .suite import Report
     from .vehicle.calibration.result import Calibration
     from .water.describe import Description, Place
     from .water.ocean import Names
@@ -389,7 +389,7 @@ def bench(
 
     `options` as `bench.bench` has them. Written as JSON where `output` says.
     """
-    from .bench import bench, read_record, write_record
+    from .evaluation.bench import bench, read_record, write_record
 
     if output is not None:
         check_output(output)
@@ -405,8 +405,8 @@ def suite(output: str | File | None = None, *, ompl: str | File | None = None, *
 
     Written as JSON where `output` says; a log per problem, as OMPL's tools read them, into the folder `ompl`.
     """
-    from .bench import write_record
-    from .suite import ompl_log, run_suite
+    from .evaluation.bench import write_record
+    from .evaluation.suite import ompl_log, run_suite
 
     if output is not None:
         check_output(output)

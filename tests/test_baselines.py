@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from glider_stream.baselines import best_glide, depth_averaged, drift, straight
+from glider_stream.evaluation.baselines import best_glide, depth_averaged, drift, straight
 from glider_stream.scenario import read_scenario
 
 

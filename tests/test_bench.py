@@ -6,9 +6,10 @@ import sys
 import pytest
 from small import command, strict_json
 
-from glider_stream import bench, planner
+from glider_stream import planner
 from glider_stream.base.errors import InputError
-from glider_stream.bench import Figure, Record, read_record
+from glider_stream.evaluation import bench
+from glider_stream.evaluation.bench import Figure, Record, read_record
 
 CEILING = "#!{}\nprint('{{\"evaluations_per_s\": 5e7}}')\n"
 

@@ -5,8 +5,9 @@ import pytest
 import reference
 from small import scenario_file
 
-from glider_stream import brute_force, planner
+from glider_stream import planner
 from glider_stream.base.threads import threads
+from glider_stream.evaluation import brute_force
 from glider_stream.kernels.edges import Edge
 from glider_stream.roadmap.neighbours import as_csr
 from glider_stream.roadmap.steering import FlowMapMethod, StreamlineMethod

@@ -15,11 +15,11 @@ FLOORS = {
     2: "kernels.control",
     3: "kernels.flight kernels.edges kernels.connect kernels.patch kernels.fan kernels.steer kernels.reach"
     " kernels.refine base",
-    4: "brute_force water water vehicle",
+    4: "water water vehicle",
     6: "roadmap search",
     7: "jobs",
-    8: "plot baselines pilot",
-    9: "scenario bench suite planner cli",
+    8: "plot pilot",
+    9: "scenario planner cli evaluation",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
 

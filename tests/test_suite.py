@@ -10,7 +10,8 @@ import pytest
 from scipy.optimize import brentq
 from small import command, strict_json
 
-from glider_stream import baselines, planner, suite
+from glider_stream import planner
+from glider_stream.evaluation import baselines, suite
 from glider_stream.scenario import read_scenario
 
 CLOSED = ("uniform-current", "jet-crossing", "solid-rotation")

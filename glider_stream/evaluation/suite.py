@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from .base.arrays import Array
-from .base.settings import require
-from .base.threads import threads
+from ..base.arrays import Array
+from ..base.settings import require
+from ..base.threads import threads
+from ..kernels.edges import Status
+from ..roadmap.builder import build_roadmap
+from ..roadmap.neighbours import Reachable
+from ..roadmap.nodes import SobolSampler
+from ..roadmap.problem import Problem
+from ..roadmap.steering import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
+from ..scenario import read_scenario
+from ..search.query import Planner
 from .baselines import BASELINES
 from .bench import made_by
 from .brute_force import fastest_legs
-from .kernels.edges import Status
-from .roadmap.builder import build_roadmap
-from .roadmap.neighbours import Reachable
-from .roadmap.nodes import SobolSampler
-from .roadmap.problem import Problem
-from .roadmap.steering import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
-from .scenario import read_scenario
-from .search.query import Planner
 
 METHODS: dict[str, Method] = {
     "flow-map": FlowMapMethod(),

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from .base.arrays import Array
-from .kernels.cache import entry_point
-from .kernels.flow import contains, velocities
-from .kernels.motion import rk4_step
-from .roadmap.problem import Problem
+from ..base.arrays import Array
+from ..kernels.cache import entry_point
+from ..kernels.flow import contains, velocities
+from ..kernels.motion import rk4_step
+from ..roadmap.problem import Problem
 
 CELLS, DEPTHS, REACH = 48, 8, 3
 """The depth-averaged search: cells along the longer side, depths of the mean, cells to a neighbour at most."""

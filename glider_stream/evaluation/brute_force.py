@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
-from .kernels.cache import entry_point
-from .kernels.control import glide_speed
-from .kernels.flow import contains
-from .kernels.motion import rk4_step
+from ..kernels.cache import entry_point
+from ..kernels.control import glide_speed
+from ..kernels.flow import contains
+from ..kernels.motion import rk4_step
 
 
 @njit

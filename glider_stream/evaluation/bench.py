@@ -19,19 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from .base.errors import InputError
-from .base.output import replacing
-from .base.settings import require
-from .base.threads import in_parallel, threads
-from .base.toml import to_toml
-from .kernels.cache import KERNEL_DIGEST, entry_point
-from .kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
-from .kernels.motion import LANES, X, Y
-from .roadmap.builder import find_edges, node_positions, warm_up
-from .roadmap.store import read_roadmap
-from .scenario import read_scenario, scenario_from_text
-from .search.query import Planner
-from .water.sampled import sample_flow
+from ..base.errors import InputError
+from ..base.output import replacing
+from ..base.settings import require
+from ..base.threads import in_parallel, threads
+from ..base.toml import to_toml
+from ..kernels.cache import KERNEL_DIGEST, entry_point
+from ..kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
+from ..kernels.motion import LANES, X, Y
+from ..roadmap.builder import find_edges, node_positions, warm_up
+from ..roadmap.store import read_roadmap
+from ..scenario import read_scenario, scenario_from_text
+from ..search.query import Planner
+from ..water.sampled import sample_flow
 
 STEPS, FLIGHTS, AT_ONCE = 60, 16_384, 256
 """RK4 steps of a flight of the raw integrator, flights in batches of LANES, batches a thread takes at once."""
