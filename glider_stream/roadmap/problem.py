@@ -20,7 +20,7 @@ class Problem:
 
     `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
-    where known. `flow_words`, `glider_words` say what they are.
+    where known. `flow_words`, `glider_words` say what they are. `slices`: many departures [s], rising.
     """
 
     evaluator: Evaluator
@@ -36,6 +36,12 @@ class Problem:
     glider_words: str
     to_lonlat: Callable[[Array], Array] | None = None
     departs: datetime | None = None
+    slices: tuple[float, ...] = ()
+
+    @property
+    def departures(self) -> tuple[float, ...]:
+        """Of all slices of the roadmap [s]: its one departure where the scenario has no [departures]."""
+        return self.slices or (self.departure,)
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""

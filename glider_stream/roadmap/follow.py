@@ -1,0 +1,164 @@
+"""Slices of a roadmap: the legs of some nodes at many departures, each departure's from those of the one before."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..base.arrays import Array, Index
+from ..base.threads import in_parallel
+from ..kernels import follow, reach
+from ..kernels.edges import Status
+from ..kernels.patch import MAX_LEVELS
+from .evaluator import NODES_AT_ONCE, Evaluator
+from .neighbours import as_csr
+from .pairs import Found, NeighbourLegs, ReachableLegs
+from .problem import Problem
+from .steering import FlowMapMethod
+
+FAN_EVERY = 8
+"""Every so many slices a fan looks for all legs again; between, they are followed."""
+BESIDE, ABOVE = 8, 1
+"""Nodes near each, to which its legs lead on: on its depth, and on the next depth above and below."""
+ROOM = 1.25
+"""Room for a node's legs, in those that it had at the departure before."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """Legs of some nodes at one departure, as `kernels.follow` has them: rows (n, room, COLUMNS), counts (n,)."""
+
+    rows: Array
+    counts: Index
+
+
+def nodes_near(position: Array) -> Index:
+    """Nodes near each of the nodes (n, 3) [m]: (n, any); a node itself where there are not so many."""
+    depths, layer = np.unique(position[:, 2], return_inverse=True)
+    everyone = np.arange(len(position))
+    if depths.size > MAX_LEVELS:
+        # nodes at any depth: in a box of equal sides those around are as far each way
+        sides = np.ptp(position, axis=0)
+        points = position / np.where(sides > 0, sides, 1.0)
+        return _nearest(points, everyone, points, everyone, BESIDE + 2 * ABOVE)
+    near = np.empty((len(position), BESIDE + 2 * ABOVE), np.int64)
+    at = position[:, :2]
+    layers = [np.flatnonzero(layer == number) for number in range(depths.size)]
+    for number, nodes in enumerate(layers):
+        near[nodes, :BESIDE] = _nearest(at[nodes], nodes, at[nodes], nodes, BESIDE)
+        for column, other in ((BESIDE, number - 1), (BESIDE + ABOVE, number + 1)):
+            there = layers[other] if 0 <= other < depths.size else nodes
+            near[nodes, column : column + ABOVE] = _nearest(at[there], there, at[nodes], nodes, ABOVE)
+    return near
+
+
+def _nearest(points: Array, numbers: Index, at: Array, own: Index, count: int) -> Index:
+    """The `count` nearest `numbers` of `points` to each place, its own number left out where that is there."""
+    asked = min(count + 1, len(points))
+    _, found = KDTree(points).query(at, k=np.arange(1, asked + 1))
+    chosen = numbers[found]
+    result = np.repeat(own[:, None], count, axis=1)
+    # an own number goes last, and is cut off
+    order = np.argsort(chosen == own[:, None], axis=1, kind="stable")
+    kept = np.take_along_axis(chosen, order, axis=1)[:, :count]
+    result[:, : kept.shape[1]] = kept
+    return result
+
+
+@dataclass(frozen=True)
+class Follower:
+    """Finds the legs of nodes at a problem's departures, one after another."""
+
+    problem: Problem
+    position: Array
+    near: Index
+    fan_every: int = FAN_EVERY
+
+    @staticmethod
+    def of(problem: Problem, position: Array) -> "Follower":
+        """A follower for nodes (n, 3) [m]."""
+        return Follower(problem, position, nodes_near(position))
+
+    def slices(self, source: Index) -> Iterator[Found]:
+        """The pairs from the nodes `source` at each departure; each node's depend on nothing but itself."""
+        exact = isinstance(self.problem.evaluator.steering, FlowMapMethod)
+        held: Held | None = None
+        before = 0.0
+        for number, departure in enumerate(self.problem.departures):
+            legs = replace(self.problem, departure=departure).legs(self.position)
+            if held is None or not exact or number % self.fan_every == 0:
+                found = legs.of(source)
+                held = _held(found)
+            else:
+                found, held = self._follow(legs, source, departure, departure - before, held)
+            before = departure
+            yield found
+
+    def _follow(
+        self, legs: NeighbourLegs | ReachableLegs, source: Index, departure: float, since: float, held: Held
+    ) -> tuple[Found, Held]:
+        evaluator: Evaluator = legs.evaluator
+        nobody = np.empty(0, np.int64)
+        limit = legs.limit if isinstance(legs, ReachableLegs) else 0
+        if isinstance(legs, NeighbourLegs):
+            indptr, target = as_csr([legs.neighbourhood.of(self.position[n]) for n in source])
+        else:
+            indptr, target = nobody, nobody
+        room = int(ROOM * held.counts.max(initial=0)) + BESIDE
+        counts = np.zeros(len(source), np.int64)
+        how = evaluator.medium, self.position, self.near, source, departure, since, indptr, target, limit
+        while True:
+            rows = np.empty((len(source), room, follow.COLUMNS))
+            task = partial(follow.follow_nodes, *how, held.rows, held.counts, counts, rows)
+            in_parallel(task, len(source), NODES_AT_ONCE)
+            if counts.max(initial=0) <= room:
+                break
+            room = int(counts.max())
+        there = np.arange(room) < counts[:, None]
+        going = there & (rows[:, :, follow.STATUS] != Status.NO_HIT)
+        pairs = self._pairs(evaluator, source, departure, rows, there, indptr, target)
+        return pairs, _packed(rows, going)
+
+    def _pairs(
+        self, evaluator: Evaluator, source: Index, departure: float, rows: Array, there: Array, *asked: Index
+    ) -> Found:
+        """All pairs that were looked at; of a neighbour law all that it names."""
+        edges = there & (rows[:, :, follow.CHOSEN] > 0)
+        chosen = rows[edges]
+        outcomes = np.ascontiguousarray(chosen[:, follow.STATUS : follow.INVERSE])
+        outcomes[outcomes[:, 0] != Status.CONNECTED, 1:] = np.nan
+        first = np.concatenate([[0], np.cumsum(edges.sum(axis=1))]).astype(np.int64)
+        found = first, chosen[:, follow.NODE].astype(np.int64), outcomes
+        indptr, target = asked
+        if not indptr.size:
+            return Found(*found)
+        result = np.empty((target.size, len(outcomes.T)))
+        departs = np.full(len(self.position), departure)
+        quick = partial(
+            reach.quick_statuses, evaluator.medium, self.position, departs, source, indptr, target, result
+        )
+        in_parallel(quick, source.size, NODES_AT_ONCE)
+        in_parallel(partial(reach.answer, indptr, target, *found, result), source.size, NODES_AT_ONCE)
+        return Found(indptr, target, result)
+
+
+def _held(found: Found) -> Held:
+    """Legs that a fan has found, as they are followed: of their flow maps nothing is known."""
+    counts = np.diff(found.indptr)
+    rows = np.zeros((len(counts), int(counts.max(initial=0)), follow.COLUMNS))
+    there = np.arange(rows.shape[1]) < counts[:, None]
+    flat = np.zeros((found.target.size, follow.COLUMNS))
+    flat[:, follow.NODE] = found.target
+    flat[:, follow.STATUS : follow.INVERSE] = found.outcomes
+    rows[there] = flat
+    return _packed(rows, there & (rows[:, :, follow.STATUS] == Status.CONNECTED))
+
+
+def _packed(rows: Array, kept: Array) -> Held:
+    """Some of the rows of each node, side by side."""
+    counts = kept.sum(axis=1).astype(np.int64)
+    packed = np.zeros((len(rows), int(counts.max(initial=0)), rows.shape[2]))
+    packed[np.arange(packed.shape[1]) < counts[:, None]] = rows[kept]
+    return Held(packed, counts)

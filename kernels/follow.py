@@ -1,0 +1,460 @@
+"""Following: the exact legs of a node at one departure are first guesses of its legs at the next.
+
+A leg changes little from one departure to the next, so its control, moved on as it moved before, lands metres
+from the target; a few coarse flights and one fine one find it again. Each leg that is found is a first guess,
+too, for the nodes near its target that are not reached, or later: so what the current brings into reach is found
+without a fan.
+"""
+
+import math
+
+import numpy as np
+
+from . import steer
+from .cache import entry_point, kernel, making
+from .control import CLIMB, DIVE, horizontal_speed, vertical_speed
+from .edges import BLOCKED, CONNECTED, NO_HIT, no_edge, store
+from .flight import LEFT, advance, hangar, rest, widen
+from .flow import velocity
+from .motion import LANES, X, Y
+from .patch import longer
+from .reach import LATEST, checked_leg, ranks
+from .steer import (
+    GOAL_X,
+    GOAL_Y,
+    HIT,
+    LANDING_TOLERANCE,
+    LOST,
+    MAX_TURN,
+    OFF_X,
+    OFF_Y,
+    OPEN,
+    STATE,
+    STEER_ROWS,
+    TURN_A,
+    TURN_H,
+    broyden,
+    take_off,
+)
+
+NODE, STATUS, TIME, COST, GLIDE_ANGLE, HEADING, SPEED, MISS = range(8)
+"""Columns of a followed leg: its target, then the fields of `Edge`."""
+INVERSE = 8
+"""The first of four: d(angle, heading) / d(x, y) of the flow map there."""
+COARSE_X, COARSE_Y = 12, 13
+"""How far its coarse flight lands from its fine one [m]."""
+RATE_A, RATE_H = 14, 15
+"""By how much its control changes with the departure [rad/s]."""
+KNOWN, CHOSEN = 16, 17
+"""Whether the columns from INVERSE on are known; whether it is one of the node's edges, not only followed."""
+COLUMNS = 18
+ORIGIN, SLOT, TURN = 18, 19, 20
+"""Columns of a guess beyond those of a leg: its node's place in the batch, its leg's, how far it was turned."""
+GUESS_COLUMNS = 21
+OF, TRIES, PENDING = range(3)
+"""Of each leg of a batch: its node's place there, guesses that were flown for it, the guess that waits for it."""
+NOBODYS, NOT_ASKED = -1, -2
+"""Instead of the number of a leg: nobody has looked for one to this node; nobody may."""
+
+COARSE_STEP = 4.0
+"""Steps of a coarse flight, in steps of a leg: RK4 errs by centimetres there, and nearly the same each time."""
+NEAR = 0.3
+"""From so near [m] the next step lands on the target: the flight is a fine one."""
+MOST_COARSE, MOST_FINE = 7, 4
+GIVE_UP = 3
+"""By this coarse flight a guess that leads anywhere has cut its miss to a quarter."""
+TILT = 1e-3
+"""Change of a control [rad] by which the flow map's derivatives are measured."""
+MOST_TRIES = 2
+"""Guesses that are flown for one target."""
+BETTER = 0.9
+"""A neighbour's guess is flown to a target already met if it may arrive in so much of the time, or less."""
+FURTHEST = 1.0
+"""A neighbour's guess that is turned further [rad] is none."""
+BEYOND = 0.05
+"""A guess so far [rad] beyond the glide polar's end is flown from its end."""
+HELD = 1.1
+"""Legs slower than the slowest edge are followed too, to so many times its time, where edges have a limit."""
+
+_ROWS = range(STEER_ROWS, STEER_ROWS + 10)
+_MODE, _COUNT, _FIRST, _SHIFT_X, _SHIFT_Y = _ROWS[:5]
+_BASE_X, _BASE_Y, _BY_A_X, _BY_A_Y, _TILT_A = _ROWS[5:]
+FOLLOW_ROWS = _ROWS.stop
+_BASE, _TILTED_A, _TILTED_H, _COARSE, _FINE = 0.0, 1.0, 2.0, 3.0, 4.0
+
+
+@kernel
+def _send(medium, position, source, departure, guess, lanes, n):
+    """Aim lane n by a guess."""
+    p = source[int(guess[ORIGIN])]
+    lanes[steer.START_X, n], lanes[steer.START_Y, n], lanes[steer.START_Z, n] = position[p]
+    lanes[steer.START_T, n] = departure
+    lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[steer.GOAL_Z, n] = position[int(guess[NODE])]
+    lanes[steer.DIRECTION, n] = CLIMB if guess[GLIDE_ANGLE] > 0.0 else DIVE
+    lanes[steer.ANGLE, n], lanes[steer.HEADING, n] = abs(guess[GLIDE_ANGLE]), guess[HEADING]
+    for m in range(4):
+        lanes[steer.INVERSE + m, n] = guess[INVERSE + m]
+    lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = guess[COARSE_X], guess[COARSE_Y]
+    lanes[STATE, n], lanes[_COUNT, n] = OPEN, 0.0
+    lanes[_MODE, n] = _COARSE if guess[KNOWN] else _BASE
+    take_off(medium.polar, lanes, n, COARSE_STEP * medium.integration.dt)
+
+
+@kernel
+def _turned(polar, lanes, n, off_x, off_y):
+    """Turn lane n's control by what its miss [m] asks for; False where the glide polar ends there."""
+    direction = int(lanes[steer.DIRECTION, n])
+    lanes[OFF_X, n], lanes[OFF_Y, n] = off_x, off_y
+    turn_a = -(lanes[steer.INVERSE, n] * off_x + lanes[steer.INVERSE + 1, n] * off_y)
+    turn_h = -(lanes[steer.INVERSE + 2, n] * off_x + lanes[steer.INVERSE + 3, n] * off_y)
+    if not abs(turn_a) + abs(turn_h) < math.inf:
+        return False
+    shorten = min(1.0, MAX_TURN / max(abs(turn_a), abs(turn_h), MAX_TURN))
+    low, high = polar.shallowest[direction], polar.steepest[direction]
+    angle = min(max(lanes[steer.ANGLE, n] + shorten * turn_a, low), high)
+    lanes[TURN_A, n], lanes[TURN_H, n] = angle - lanes[steer.ANGLE, n], shorten * turn_h
+    if lanes[TURN_A, n] == 0.0 and turn_a != 0.0 and lanes[_COUNT, n] > 0.0:
+        return False
+    lanes[steer.ANGLE, n] = angle
+    lanes[steer.HEADING, n] += shorten * turn_h
+    return True
+
+
+@kernel
+def _measured(polar, lanes, n, off_x, off_y, dt):
+    """Lane n has flown for its flow map's derivatives: on to the next flight; False where it has none."""
+    mode = lanes[_MODE, n]
+    if mode == _BASE:
+        lanes[_BASE_X, n], lanes[_BASE_Y, n] = off_x, off_y
+        steepest = polar.steepest[int(lanes[steer.DIRECTION, n])]
+        lanes[_TILT_A, n] = TILT if lanes[steer.ANGLE, n] + TILT <= steepest else -TILT
+        lanes[steer.ANGLE, n] += lanes[_TILT_A, n]
+        lanes[_MODE, n] = _TILTED_A
+    elif mode == _TILTED_A:
+        lanes[_BY_A_X, n] = (off_x - lanes[_BASE_X, n]) / lanes[_TILT_A, n]
+        lanes[_BY_A_Y, n] = (off_y - lanes[_BASE_Y, n]) / lanes[_TILT_A, n]
+        lanes[steer.ANGLE, n] -= lanes[_TILT_A, n]
+        lanes[steer.HEADING, n] += TILT
+        lanes[_MODE, n] = _TILTED_H
+    else:
+        x_h, y_h = (off_x - lanes[_BASE_X, n]) / TILT, (off_y - lanes[_BASE_Y, n]) / TILT
+        x_a, y_a = lanes[_BY_A_X, n], lanes[_BY_A_Y, n]
+        lanes[steer.HEADING, n] -= TILT
+        det = x_a * y_h - x_h * y_a
+        lanes[steer.INVERSE, n], lanes[steer.INVERSE + 1, n] = y_h / det, -x_h / det
+        lanes[steer.INVERSE + 2, n], lanes[steer.INVERSE + 3, n] = -y_a / det, x_a / det
+        lanes[_MODE, n] = _COARSE
+        miss = math.hypot(lanes[_BASE_X, n], lanes[_BASE_Y, n])
+        lanes[_FIRST, n], lanes[_COUNT, n] = miss, 1.0
+        if not _turned(polar, lanes, n, lanes[_BASE_X, n], lanes[_BASE_Y, n]):
+            return False
+    take_off(polar, lanes, n, COARSE_STEP * dt)
+    return True
+
+
+@kernel
+def _landed(polar, lanes, n, dt):
+    """Lane n has landed: on its target, HIT; nowhere near, LOST; else it is turned, and flies again."""
+    off_x, off_y = lanes[X, n] - lanes[GOAL_X, n], lanes[Y, n] - lanes[GOAL_Y, n]
+    lanes[STATE, n] = OPEN
+    if lanes[_MODE, n] < _COARSE:
+        if not _measured(polar, lanes, n, off_x, off_y, dt):
+            lanes[STATE, n] = LOST
+            rest(lanes, n)
+        return
+    fine = lanes[_MODE, n] == _FINE
+    if not fine:
+        off_x, off_y = off_x - lanes[_SHIFT_X, n], off_y - lanes[_SHIFT_Y, n]
+    miss = math.hypot(off_x, off_y)
+    count = lanes[_COUNT, n]
+    first_fine = fine and count == 0.0
+    if first_fine:
+        # the coarse flight with this control would have landed on the target, its shift taken off
+        lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = lanes[_SHIFT_X, n] - off_x, lanes[_SHIFT_Y, n] - off_y
+    if fine and miss <= LANDING_TOLERANCE:
+        lanes[steer.MISS, n] = miss
+        lanes[steer.HEADING, n] = math.atan2(math.sin(lanes[steer.HEADING, n]), math.cos(lanes[steer.HEADING, n]))
+        lanes[STATE, n] = HIT
+        rest(lanes, n)
+        return
+    if count == 0.0:
+        lanes[_FIRST, n] = miss
+    elif not first_fine:
+        broyden(lanes, n, off_x - lanes[OFF_X, n], off_y - lanes[OFF_Y, n])
+    astray = not fine and count == GIVE_UP and miss > 0.25 * lanes[_FIRST, n]
+    late = count == (MOST_FINE if fine else MOST_COARSE) - 1.0
+    if astray or late or not miss < math.inf or not _turned(polar, lanes, n, off_x, off_y):
+        lanes[STATE, n] = LOST
+        rest(lanes, n)
+        return
+    lanes[_COUNT, n] += 1.0
+    if not fine and miss <= NEAR:
+        lanes[_MODE, n], lanes[_COUNT, n] = _FINE, 0.0
+        fine = True
+    take_off(polar, lanes, n, dt if fine else COARSE_STEP * dt)
+
+
+@making
+def _fly(medium, position, source, departure, guesses, count, legs, lanes):
+    """Fly all guesses to their ends; what is met, and cheaper than what its leg was, becomes the leg."""
+    flying = np.zeros(LANES, np.int64)
+    horizon = medium.integration.dt * medium.integration.steps
+    following, busy = 0, 0
+    lanes[LEFT] = math.inf
+    for n in range(LANES):
+        if following < count:
+            flying[n] = following
+            _send(medium, position, source, departure, guesses[following], lanes, n)
+            following += 1
+            busy += 1
+    while busy > 0:
+        advance(medium.flow, lanes)
+        widen(lanes)
+        for n in range(LANES):
+            if lanes[LEFT, n] > 0.0:
+                continue
+            _landed(medium.polar, lanes, n, medium.integration.dt)
+            leg = legs[int(guesses[flying[n], SLOT])]
+            latest = LATEST * horizon
+            if leg[STATUS] == CONNECTED and lanes[_MODE, n] == _FINE:
+                latest = leg[TIME]
+            if lanes[STATE, n] == OPEN and lanes[steer.TIME, n] <= latest:
+                continue
+            if lanes[STATE, n] == HIT and lanes[steer.TIME, n] <= horizon:
+                _take(medium, lanes, n, leg)
+            if following < count:
+                flying[n] = following
+                _send(medium, position, source, departure, guesses[following], lanes, n)
+                following += 1
+            else:
+                rest(lanes, n)
+                busy -= 1
+
+
+@kernel
+def _take(medium, lanes, n, leg):
+    """Make the leg of what lane n has found, where that is better."""
+    if leg[STATUS] == CONNECTED and lanes[steer.TIME, n] >= leg[TIME]:
+        return
+    edge = checked_leg(medium, lanes, n)
+    if not (edge.status == CONNECTED or (edge.status == BLOCKED and leg[STATUS] == NO_HIT)):
+        return
+    store(leg[STATUS:INVERSE], edge)
+    if edge.status == BLOCKED:  # its control is followed all the same: the way may open
+        climbs = lanes[steer.DIRECTION, n] == CLIMB
+        leg[GLIDE_ANGLE] = lanes[steer.ANGLE, n] if climbs else -lanes[steer.ANGLE, n]
+        leg[HEADING] = lanes[steer.HEADING, n]
+    for m in range(4):
+        leg[INVERSE + m] = lanes[steer.INVERSE + m, n]
+    leg[COARSE_X], leg[COARSE_Y], leg[KNOWN] = lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n], 1.0
+
+
+@kernel
+def _neighbours_guess(polar, position, z_p, leg, over_x, over_y, r, guess):
+    """A first guess for the target r out of a leg to another, into `guess`; its time [s], inf where it is none.
+
+    The leg, which began at the height z_p [m], is flown on, or less far, to r's depth at its last velocity over
+    ground [m/s], and turned by what it then misses.
+    """
+    direction = CLIMB if leg[GLIDE_ANGLE] > 0.0 else DIVE
+    x, y, z = position[int(leg[NODE])]
+    x_r, y_r, z_r = position[r]
+    angle, heading = abs(leg[GLIDE_ANGLE]), leg[HEADING]
+    since = (2.0 * direction - 1.0) * (z_r - z) / vertical_speed(polar, direction, angle)
+    off_x, off_y = x + since * over_x - x_r, y + since * over_y - y_r
+    turn_a = -(leg[INVERSE] * off_x + leg[INVERSE + 1] * off_y)
+    turn_h = -(leg[INVERSE + 2] * off_x + leg[INVERSE + 3] * off_y)
+    turn = max(abs(turn_a), abs(turn_h))
+    low, high = polar.shallowest[direction], polar.steepest[direction]
+    if not turn < FURTHEST or angle + turn_a < low - BEYOND or angle + turn_a > high + BEYOND:
+        return math.inf
+    angle = min(max(angle + turn_a, low), high)
+    for m in range(COLUMNS):  # not a slice, which makes a copy
+        guess[m] = leg[m]
+    guess[NODE], guess[TURN] = r, turn
+    guess[GLIDE_ANGLE], guess[HEADING] = (angle if direction == CLIMB else -angle), heading + turn_h
+    return abs(z_r - z_p) / vertical_speed(polar, direction, angle)
+
+
+@kernel
+def _over_ground(medium, position, z_p, departure, leg):
+    """A leg's velocity over ground [m/s] where it ends."""
+    direction = CLIMB if leg[GLIDE_ANGLE] > 0.0 else DIVE
+    x, y, z = position[int(leg[NODE])]
+    angle = abs(leg[GLIDE_ANGLE])
+    u, v = velocity(
+        medium.flow, x, y, z, departure + abs(z - z_p) / vertical_speed(medium.polar, direction, angle)
+    )
+    along = horizontal_speed(medium.polar, direction, angle)
+    return u + along * math.cos(leg[HEADING]), v + along * math.sin(leg[HEADING])
+
+
+@making
+def _slowest_edges(legs, slots, count, nodes, limit, horizon):
+    """By when [s] the edges of each node and direction arrive, (nodes, 2): the horizon but for a limit."""
+    cut = np.full((nodes, 2), horizon)
+    if limit == 0:
+        return cut
+    met = np.zeros((nodes, 2), np.int64)
+    for k in ranks(legs[:count, TIME].copy()):
+        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
+        if legs[k, STATUS] == CONNECTED:
+            met[n, direction] += 1
+            if met[n, direction] == limit:
+                cut[n, direction] = legs[k, TIME]
+    return cut
+
+
+@making
+def _neighbours_guesses(
+    medium, position, near, source, departure, before, cut, where, legs, slots, count, guesses
+):  # fmt: skip
+    """Guesses for the nodes near the targets of legs that are new since `before`, the nearest guess of each.
+
+    Returns (legs, slots, count, guesses, asked): a target that nobody has looked at gets its leg, NO_HIT.
+    """
+    asked = 0
+    for k in range(count):
+        slots[k, PENDING] = -1
+    for k in range(before.size):
+        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
+        # NaN, of blocked ones, differs from itself
+        new = legs[k, STATUS] != NO_HIT and legs[k, TIME] != before[k]
+        if not new or legs[k, TIME] > HELD * cut[n, direction]:
+            continue
+        z_p = position[source[n], 2]
+        over_x, over_y = _over_ground(medium, position, z_p, departure, legs[k])
+        for m in range(near.shape[1]):
+            r = near[int(legs[k, NODE]), m]
+            slot = where[n, r]
+            if (2.0 * direction - 1.0) * (position[r, 2] - z_p) <= 0.0 or slot == NOT_ASKED:
+                continue
+            if slot >= 0 and slots[slot, TRIES] >= MOST_TRIES:
+                continue
+            guesses = longer(guesses, asked + 1)
+            guess = guesses[asked]
+            time = _neighbours_guess(medium.polar, position, z_p, legs[k], over_x, over_y, r, guess)
+            met = slot >= 0 and legs[slot, STATUS] == CONNECTED
+            if not time <= (BETTER * legs[slot, TIME] if met else LATEST * cut[n, direction]):
+                continue
+            if slot < 0:
+                slot = count
+                count += 1
+                legs, slots = longer(legs, count), longer(slots, count)
+                store(legs[slot, STATUS:INVERSE], no_edge(NO_HIT))
+                legs[slot, INVERSE:] = 0.0
+                legs[slot, NODE], legs[slot, GLIDE_ANGLE] = r, legs[k, GLIDE_ANGLE]
+                slots[slot, OF], slots[slot, TRIES], slots[slot, PENDING] = n, 0, -1
+                where[n, r] = slot
+            guess[ORIGIN], guess[SLOT] = n, slot
+            other = slots[slot, PENDING]
+            if other < 0:
+                slots[slot, PENDING] = asked
+                asked += 1
+            elif guess[TURN] < guesses[other, TURN]:
+                guesses[other] = guess
+    for k in range(asked):
+        slots[int(guesses[k, SLOT]), TRIES] += 1
+    return legs, slots, count, guesses, asked
+
+
+@making
+def _asked_for(indptr, target, first, last, nodes):
+    """Which leg is to which node, (last - first, nodes): NOBODYS, or NOT_ASKED where `indptr` does not name it."""
+    where = np.full((last - first, nodes), NOBODYS if indptr.size == 0 else NOT_ASKED, np.int32)
+    if indptr.size > 0:
+        for n in range(first, last):
+            for k in range(indptr[n], indptr[n + 1]):
+                where[n - first, target[k]] = NOBODYS
+    return where
+
+
+@entry_point(nogil=True)
+def follow_nodes(
+    medium, position, near, source, departure, since, indptr, target, limit, held, holds, counts, found, first,
+    last,
+):  # fmt: skip
+    """The legs from the nodes source[first:last] at a departure [s], by those that they had `since` [s] before.
+
+    `near` (nodes, k): nodes beside each, to which its legs lead on. `held` (n, any, COLUMNS), `holds` (n,) legs
+    of each. To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with a `limit`
+    the fastest so many of each direction are CHOSEN. All pairs that were looked at, by rising node, into rows
+    of `found` (n, capacity, COLUMNS); a count above the capacity says how much is needed.
+    """
+    horizon = medium.integration.dt * medium.integration.steps
+    lanes = hangar(FOLLOW_ROWS)
+    where = _asked_for(indptr, target, first, last, position.shape[0])
+    followed = np.sum(holds[first:last])
+    legs = np.empty((2 * followed + 1, COLUMNS))
+    slots = np.zeros((2 * followed + 1, 3), np.int64)
+    guesses = np.empty((followed + 1, GUESS_COLUMNS))
+    count = 0
+    for n in range(last - first):
+        for k in range(holds[first + n]):
+            guesses[count, :COLUMNS] = held[first + n, k]
+            guesses[count, ORIGIN], guesses[count, SLOT] = n, count
+            _moved_on(medium.polar, guesses[count], since)
+            legs[count] = held[first + n, k]
+            store(legs[count, STATUS:INVERSE], no_edge(NO_HIT))
+            legs[count, GLIDE_ANGLE] = held[first + n, k, GLIDE_ANGLE]
+            slots[count, OF], slots[count, TRIES] = n, 1
+            where[n, int(legs[count, NODE])] = count
+            count += 1
+    asked = count
+    cut = np.full((last - first, 2), horizon)
+    while asked > 0:
+        before = legs[:count, TIME].copy()
+        _fly(medium, position, source[first:last], departure, guesses, asked, legs, lanes)
+        cut = _slowest_edges(legs, slots, count, last - first, limit, horizon)
+        legs, slots, count, guesses, asked = _neighbours_guesses(
+            medium, position, near, source[first:last], departure, before, cut, where, legs, slots, count, guesses
+        )
+    _note_rates(legs, since, held, holds, first, last)
+    _hand_over(legs, slots, count, limit, cut, counts, found, first, last)
+
+
+@kernel
+def _moved_on(polar, guess, since):
+    """Move a leg's control on as it moved before."""
+    climbs = guess[GLIDE_ANGLE] > 0.0
+    direction = CLIMB if climbs else DIVE
+    low, high = polar.shallowest[direction], polar.steepest[direction]
+    angle = min(max(abs(guess[GLIDE_ANGLE]) + since * guess[RATE_A], low), high)
+    guess[GLIDE_ANGLE] = angle if climbs else -angle
+    guess[HEADING] += since * guess[RATE_H]
+
+
+@kernel
+def _note_rates(legs, since, held, holds, first, last):
+    """By how much the controls of the legs that were followed have changed with the departure."""
+    at = 0
+    for n in range(first, last):
+        for k in range(holds[n]):
+            leg, before = legs[at], held[n, k]
+            turn_a = abs(leg[GLIDE_ANGLE]) - abs(before[GLIDE_ANGLE])
+            turn_h = leg[HEADING] - before[HEADING]
+            turn_h = math.atan2(math.sin(turn_h), math.cos(turn_h))
+            leg[RATE_A], leg[RATE_H] = 0.0, 0.0
+            # further it is another leg, and not the same, moved on
+            if abs(turn_a) < MAX_TURN and abs(turn_h) < MAX_TURN:
+                leg[RATE_A], leg[RATE_H] = turn_a / since, turn_h / since
+            at += 1
+
+
+@making
+def _hand_over(legs, slots, count, limit, cut, counts, found, first, last):
+    """Which of the legs are edges, and all by rising node into `found`."""
+    chosen = np.zeros((last - first, 2), np.int64)
+    # costs rise with times; NaN, of what is not connected, sorts last
+    for k in ranks(legs[:count, TIME].copy()):
+        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
+        legs[k, CHOSEN] = 1.0 if limit == 0 or chosen[n, direction] < limit else 0.0
+        chosen[n, direction] += 1
+    counts[first:last] = 0
+    for k in ranks(legs[:count, NODE].copy()):
+        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
+        if legs[k, CHOSEN] == 0.0 and not legs[k, TIME] <= HELD * cut[n, direction]:
+            continue
+        if counts[first + n] < found.shape[1]:
+            found[first + n, counts[first + n]] = legs[k]
+        counts[first + n] += 1
