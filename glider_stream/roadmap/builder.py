@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..base.threads import threads
-from ..kernels.edges import Status
+from ..kernels.edges import STATUS, TIME, Status
 from .pairs import Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
@@ -74,12 +74,12 @@ def find_edges(
 def _evaluated(legs: Legs, source: Index) -> Edges:
     began = time.perf_counter()
     batch = legs.of(source)
-    status = batch.outcomes[:, 0].astype(np.int64)
+    status = batch.outcomes[:, STATUS].astype(np.int64)
     connected = status == Status.CONNECTED
     node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
     counts = np.bincount(node * len(Status) + status, minlength=len(source) * len(Status))
     by_node: NDArray[np.int32] = counts.reshape(len(source), len(Status)).astype(np.int32)
-    target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, 1:]
+    target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, TIME:]
     degree = np.bincount(node[connected], minlength=len(source))
     return Edges(source, degree, target, values, by_node, time.perf_counter() - began)
 
