@@ -54,7 +54,7 @@ def literal_loop(flow, polar, steering, integration, position, source, indptr, t
             for one in range(count):
                 c = control_towards(polar, direction_of(pair), controls[one, 0], controls[one, 1])
                 miss, when = literal_approach(flow, pair, c, integration)
-                if miss < integration.tolerance and when < best[k]:
+                if miss < integration.tolerance and 0.0 < when < best[k]:
                     best[k] = when
     return best
 

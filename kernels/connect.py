@@ -248,7 +248,8 @@ def _settle(medium, lanes, n, edge, chosen):
     """Let lane n's closest approach be the edge, where it hits and is cheaper; returns the chosen control."""
     integration = medium.integration
     duration = lanes[TRY_DURATION, n]
-    if lanes[TRY_MISS, n] >= integration.tolerance:
+    # who is nearest when he leaves goes away from his goal: a leg takes time
+    if lanes[TRY_MISS, n] >= integration.tolerance or duration == 0.0:
         return chosen
     cost = edge_cost(medium.cost, duration)
     if edge[STATUS] == CONNECTED and (cost, lanes[TRY_CONTROL, n]) >= (edge[COST], chosen):

@@ -64,6 +64,13 @@ def vertical_speed(polar, direction, angle):
     return glide_speed(polar, direction, angle) * math.sin(angle)
 
 
+@kernel
+def heading_of(x, y):
+    """The heading of a direction [rad], from -pi, which is west, up to but not including pi."""
+    heading = math.atan2(y, x)
+    return heading if heading < math.pi else -math.pi
+
+
 @shared
 def control_of(speed: float, glide_angle: float, heading: float) -> Control:
     """The control of a speed through water [m/s], a signed glide angle and a heading [rad]."""
@@ -177,7 +184,7 @@ def heading_on_line(plane, horizontal, branch):
     s = math.sqrt(max(0.0, r * horizontal * horizontal - plane.c * plane.c))
     u = (-plane.a * plane.c + branch * plane.b * s) / r
     v = (-plane.b * plane.c - branch * plane.a * s) / r
-    return math.atan2(v, u)
+    return heading_of(u, v)
 
 
 def _on_line(steering, flow, polar, pair, slowest, controls):
@@ -194,8 +201,8 @@ def _on_line(steering, flow, polar, pair, slowest, controls):
     shallow = max(shallow, needed)
     if plane.a == 0.0 and plane.b == 0.0:
         count = min(2, steering.candidates)
-        controls[0] = (steep, math.atan2(plane.v, plane.u))
-        controls[count - 1] = (shallow if count == 2 else steep, math.atan2(plane.v, plane.u))
+        controls[0] = (steep, heading_of(plane.u, plane.v))
+        controls[count - 1] = (shallow if count == 2 else steep, heading_of(plane.u, plane.v))
         return count
     count = steering.candidates
     angles = (count + 1) // 2

@@ -204,7 +204,7 @@ def _aim_at(medium, position, points, tasks, guess, lanes, n):
 def _correct(medium, lanes, n, deadline):
     """Lane n has landed: correct its control, so that it flies again; False where its guess is settled."""
     before = lanes[AIM_TIME, n]
-    correct(medium.polar, lanes, n, medium.integration.dt)
+    correct(medium.polar, medium.integration, lanes, n)
     time = lanes[AIM_TIME, n]
     return lanes[AIM_STATE, n] == OPEN and time - SURE * abs(time - before) <= deadline
 

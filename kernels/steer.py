@@ -3,12 +3,12 @@
 import math
 
 from .cache import inlined, kernel
-from .control import control_towards
+from .control import control_towards, heading_of
 from .flight import FLIGHT_ROWS, ends_of, fly_for, keep_ends, place, rest
 from .motion import LANE_X, LANE_Y
 
 LANDING_TOLERANCE = 0.009
-"""A landing this close to its target [m] is a hit: a little less than what an edge may miss by."""
+"""A landing this close to its target [m] is a hit, where it is nearer than the scenario's tolerance, too."""
 FIRST_STEP = 3.0
 """Steps of a guess's first flight, in steps of a leg: where it lands is corrected anyway."""
 MAX_ITERATIONS = 14
@@ -57,7 +57,7 @@ def _take_off(polar, lanes, n, dt):
 
 
 @kernel
-def correct(polar, lanes, n, dt):
+def correct(polar, integration, lanes, n):
     """Lane n has landed: on its target, HIT; nowhere near, LOST; else a Broyden step, and it flies again."""
     direction = int(lanes[AIM_DIRECTION, n])
     _, goal = ends_of(lanes, n)
@@ -65,8 +65,8 @@ def correct(polar, lanes, n, dt):
     miss = math.hypot(off_x, off_y)
     lanes[AIM_MISS, n] = miss
     iteration = lanes[_ITERATION, n]
-    if miss <= LANDING_TOLERANCE and iteration > 0.0:
-        lanes[AIM_HEADING, n] = math.atan2(math.sin(lanes[AIM_HEADING, n]), math.cos(lanes[AIM_HEADING, n]))
+    if miss <= LANDING_TOLERANCE and miss < integration.tolerance and iteration > 0.0:
+        lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
         lanes[AIM_STATE, n] = HIT
         rest(lanes, n)
         return
@@ -91,7 +91,7 @@ def correct(polar, lanes, n, dt):
     lanes[AIM_ANGLE, n] = angle
     lanes[AIM_HEADING, n] += shorten * turn_h
     lanes[_ITERATION, n] += 1.0
-    _take_off(polar, lanes, n, dt)
+    _take_off(polar, lanes, n, integration.dt)
 
 
 @inlined

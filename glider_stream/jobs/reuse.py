@@ -149,8 +149,7 @@ class _Lattice:
         gap = distance_transform_edt(~changed)[at[:, 0], at[:, 1]] * self.step - 2 * self.step
         legs = self.now.legs(self.position)
         near, far = (
-            (self.glide + speed) * self.horizon
-            for speed in sorted(flow.extent.max_speed for flow in self.flows)
+            (self.glide + speed) * self.horizon for speed in sorted(flow.extent.max_speed for flow in self.flows)
         )
         if not isinstance(legs, NeighbourLegs):
             return np.asarray(safe & (gap > far) if straight else safe)

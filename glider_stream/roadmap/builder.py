@@ -16,6 +16,7 @@ from .pairs import Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
 from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
+from .step_error import with_steps_checked
 
 BATCH_PAIRS = 100_000
 
@@ -119,6 +120,12 @@ def build_roadmap(
     parts: list[Edges] = []
     with threads(thread_count) as used:
         warm_up(problem)
+        made = with_steps_checked(
+            provenance_of(problem, position),
+            problem,
+            position,
+            lambda nodes: in_order(list(find_edges(problem, position, nodes, batch_pairs))),
+        )
         tally = Tally(len(position), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
             parts.append(edges)
@@ -128,7 +135,7 @@ def build_roadmap(
         position=position,
         indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
         target=whole.target,
-        provenance=provenance_of(problem, position),
+        provenance=made,
         lonlat=lonlat_of(problem, position),
         counts=tally.by_name(),
         wall_s=tally.seconds,

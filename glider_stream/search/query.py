@@ -19,6 +19,7 @@ from ..roadmap.pairs import Attached, Legs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
+from ..roadmap.step_error import check_steps
 from ..water.frame import true_north
 from .path import Leg, Path
 
@@ -71,6 +72,7 @@ class Planner:
     def __init__(self, roadmap: Roadmap, problem: Problem) -> None:
         """Check that flow and glider are those that the roadmap was built with."""
         check_unchanged(roadmap, problem)
+        check_steps(roadmap, problem)
         self.roadmap = roadmap
         self.problem = problem
         self._kept: tuple[Blend, Array] | None = None

@@ -68,7 +68,7 @@ def literal_edges(flow, polar, steering, integration, position, departure, sourc
                 if off < miss:
                     miss, time = off, (step + share) * dt
                 x, y, z = x_next, y_next, z_next
-            if miss < integration.tolerance and time < cheapest:
+            if miss < integration.tolerance and 0.0 < time < cheapest:
                 cheapest = time
                 edges[pair] = (1.0, time, time, c.glide_angle, c.heading, c.speed, miss)
     return edges
