@@ -16,11 +16,13 @@ from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
 from .pilot.card import Card
 from .pilot.card import card as card_of
-from .pilot.export import check_export, export_path
+from .pilot.export import check_export, check_legs, export_path
+from .pilot.lint import Linted
+from .pilot.lint import lint as lint_file
 from .pilot.route_files import read_drawn
 from .pilot.score import Score
 from .pilot.score import score as score_of
-from .pilot.windows import HOURS
+from .pilot.slocum_files import MOST_WAYPOINTS
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
@@ -33,6 +35,7 @@ from .search.surfacing import Surfacing, SurfacingPlanner
 from .search.thin import thin as thinned
 from .search.trade_off import TradeOff
 from .search.trade_off import trade_off as find_trade_off
+from .search.why_not import no_edges
 from .water.domain import GeographicDomain, Point
 
 if TYPE_CHECKING:
@@ -146,7 +149,7 @@ def query(
     most_energy: float | None = None,
     thin: float | None = None,
     surfacing: Mapping[str, Any] | None = None,
-    window_hours: float = HOURS,
+    **export: Any,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
@@ -154,8 +157,8 @@ def query(
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
     for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
     near the straight line, where one glide does, and none where that breaks another rule. `surfacing`
-    is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. Exported
-    windows last `window_hours`.
+    is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. `export`
+    is how files are written, as `pilot.export.Options` has it; the path's `notes` say what else that did.
     """
     for output in outputs:
         check_export(output)
@@ -167,17 +170,18 @@ def query(
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
         front = _front(search, ends)
         last = front.paths[-1]
-        why = (
-            f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}" if last.found else ""
-        )
+        least_of_all = f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}"
+        why = least_of_all if last.found else last.why
         within = front.within(most_energy)
         least = front.least_time(most_energy)
         path = replace(within, least_time=least) if within else replace(last, cost=math.inf, legs=(), why=why)
     if thin is not None:
         path = _with_fewer_legs(path, thin, search, most_energy)
+    check_legs(path, outputs)
+    notes: list[str] = []
     for output in outputs:
-        export_path(path, output, window_hours)
-    return path
+        export_path(path, output, notes.append, **export)
+    return replace(path, notes=tuple(notes))
 
 
 def _with_fewer_legs(path: Path, tolerance: float, search: Planner, most_energy: float | None) -> Path:
@@ -207,19 +211,43 @@ def card(roadmap: str | File | Roadmap, path: Path) -> Card:
     return card_of(path, scenario_from_text(road.provenance.scenario).problem())
 
 
-def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
-    """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in a roadmap's water."""
-    drawn = read_drawn(route)
+def score(
+    roadmap: str | File | Roadmap, route: str | File | Sequence[str | File], start: Point | None = None
+) -> Score:
+    """Fly a drawn route (CSV, GeoJSON, KML, GPX, a path file, goto lists, targets) in a roadmap's water.
+
+    Several files are one route, one after another. `start`, in the coordinates of the scenario's domain, is where
+    the vehicle is, before the route's first point.
+    """
+    files = [route] if isinstance(route, str | File) else list(route)
+    drawn = [read_drawn(file) for file in files]
     # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
-    search, _ = _search(roadmap, None, None, Surfacing())
+    search, (begin, _) = _search(roadmap, start, None, Surfacing())
     domain = scenario_from_text(search.roadmap.provenance.scenario).domain
     on_globe = isinstance(domain, GeographicDomain)
     cure = "and the roadmap is in metres; give x, y, z in a CSV file"
-    require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
-    points = [domain.point(place) if drawn.geographic else np.array(place) for place in drawn.places]
-    for n, point in enumerate(points, 1):
-        search.problem.check_point(point, f"point {n}")
-    return score_of(points, search.connect, search.query, search.fly)
+    points = [] if begin is None else [begin]
+    for file, one in zip(files, drawn, strict=True):
+        require(on_globe or not one.geographic, f"the route {file} is in longitude and latitude, {cure}")
+        points += [domain.point(place) if one.geographic else np.array(place) for place in one.places]
+    require(len(points) > 1, f"the route {files[0]} holds one point; say with --start where the vehicle is")
+    for n, point in enumerate(points, 1 if begin is None else 0):
+        search.problem.check_point(point, f"point {n}" if n else "start")
+    notes = [note for one in drawn for note in one.notes]
+    if begin is None and drawn[0].of_vehicle:
+        notes.append("the way to its first point is not scored; say with --start where the vehicle is")
+    return replace(score_of(points, search.connect, search.query, search.fly), notes=tuple(notes))
+
+
+def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
+    """What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets."""
+    return [lint_file(file, most_waypoints) for file in files]
+
+
+def why_no_edges(roadmap: str | File | Roadmap) -> str:
+    """Why a roadmap holds no edge, in a sentence; empty where it holds some."""
+    road = info(roadmap)
+    return "" if road.target.size else no_edges(road, scenario_from_text(road.provenance.scenario).problem())
 
 
 def _search(

@@ -11,7 +11,7 @@ from test_ocean import IONIAN, WASHINGTON, real
 
 from glider_stream import planner
 from glider_stream.pilot.export import export_path
-from glider_stream.pilot.slocum import lint
+from glider_stream.pilot.slocum_files import goto_faults as lint
 from glider_stream.pilot.waypoints import from_degrees_and_minutes, waypoints
 from glider_stream.roadmap.verify import verify
 from glider_stream.scenario import read_scenario
