@@ -153,8 +153,8 @@ def query(
     from . import planner
 
     rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
-    export = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
-    export = {name: value for name, value in export.items() if value is not None}
+    given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
+    export: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if front:
         alone = not outputs and most_energy is None and thin is None and not export and not as_card
         if not alone:

@@ -23,6 +23,7 @@ from .pilot.route_files import read_drawn
 from .pilot.score import Score
 from .pilot.score import score as score_of
 from .pilot.slocum_files import MOST_WAYPOINTS
+from .pilot.windows import HOURS
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
@@ -149,7 +150,9 @@ def query(
     most_energy: float | None = None,
     thin: float | None = None,
     surfacing: Mapping[str, Any] | None = None,
-    **export: Any,
+    window_hours: float = HOURS,
+    most_waypoints: int = MOST_WAYPOINTS,
+    arrival_radius: float | None = None,
 ) -> Path:
     """The cheapest path between two points, given in the coordinates of the scenario's domain.
 
@@ -157,8 +160,9 @@ def query(
     scenario's own start and goal where none are given. Written to each of `outputs`. `most_energy` [J] asks
     for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins legs whose stops lie so
     near the straight line, where one glide does, and none where that breaks another rule. `surfacing`
-    is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. `export`
-    is how files are written, as `pilot.export.Options` has it; the path's `notes` say what else that did.
+    is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. Exported
+    windows last `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within
+    `arrival_radius` [m], each vehicle's usual one if None; the path's `notes` say what else was done to files.
     """
     for output in outputs:
         check_export(output)
@@ -178,9 +182,10 @@ def query(
     if thin is not None:
         path = _with_fewer_legs(path, thin, search, most_energy)
     check_legs(path, outputs)
+    options = {"window_hours": window_hours, "most_waypoints": most_waypoints, "arrival_radius": arrival_radius}
     notes: list[str] = []
     for output in outputs:
-        export_path(path, output, notes.append, **export)
+        export_path(path, output, notes.append, **options)
     return replace(path, notes=tuple(notes))
 
 

@@ -18,5 +18,5 @@ def span(seconds: float) -> str:
 
 
 def hours(seconds: float) -> str:
-    """Hours of a time [s], with as many digits as tell two legs apart."""
-    return f"{seconds / HOUR:,.{3 if abs(seconds) < 10 * HOUR else 1}f}"
+    """Hours of a time [s]."""
+    return f"{seconds / HOUR:,.2f}"

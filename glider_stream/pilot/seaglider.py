@@ -1,5 +1,6 @@
 """Seaglider's `targets` file: waypoints, each naming the next; written, read, looked through for faults."""
 
+import math
 import re
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ OPTIONAL = {"escape": None, "depth": (-2000.0, 2000.0), "finish": (-1.0, 360.0),
 
 def targets(path: Path, name: str, radius: float = RADIUS) -> dict[str, str]:
     """A route as a targets file; the last target is held."""
-    require(radius > 0, f"a target must be reached within more than 0 m; got {radius:g}")
+    require(0 < radius < math.inf, f"a target must be reached within more than 0 m; got {radius:g}")
     places = waypoints(path)
     most = f"{len(places)} targets are more than {MOST_TARGETS}; plan fewer surfacings"
     require(len(places) <= MOST_TARGETS, most)

@@ -4,6 +4,7 @@ The search says when each node is reached, if it is. From the nodes reached that
 that would lead on are looked at again, and each says what became of it.
 """
 
+import math
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from typing import Any
@@ -21,8 +22,6 @@ FRONTIER = 32
 """How many of the nodes reached, those nearest to the goal, are looked at."""
 ONWARD = 27
 """How many legs of each: to the nearest nodes at other depths."""
-SAMPLED = 64
-"""Nodes whose distance to the nearest one at another depth is measured."""
 ALONG = 9
 """Places on a leg where the current is read."""
 WORDS = {
@@ -163,14 +162,11 @@ class WhyNot:
         where = f"({x:.6g}, {y:.6g}, {self.nearest[2]:.6g})"
         if self.place is not None:
             where = f"({x:.4f}, {y:.4f}, {0.0 - self.nearest[2]:.6g} m)"
-        when = moment(self.departs, self.after)
-        near = f"{self.reached:,} of {self.nodes:,} nodes are reached, the nearest to the goal is {where}, "
-        near += (
-            f"{_far(self.distance)} from it, at {when}"
-            if self.departs
-            else f"{_far(self.distance)} from it, after {when}"
-        )
-        return f"{said}; {near}; {ADVICE[self.cause]}"
+        when = f"{'after' if self.departs is None else 'at'} {moment(self.departs, self.after)}"
+        near = "the start itself" if self.after == 0 else f"{where}, {when}"
+        reached = f"{self.reached:,} of {self.nodes:,} nodes are reached"
+        nearest = f"the nearest to the goal, {_far(self.distance)} from it, is {near}"
+        return f"{said}; {reached}, {nearest}; {ADVICE[self.cause]}"
 
 
 def _far(metres: float) -> str:
@@ -275,9 +271,13 @@ def _onward(
 
 
 def _into(problem: Problem, position: Array, departs: Array, goal: Array) -> Looked:
-    """The legs to the goal from the nearest places at other depths."""
+    """The legs to the goal from places at other depths: the nearest, and some of all others within reach."""
     near = np.flatnonzero(position[:, 2] != goal[2])
-    near = near[np.argsort(np.linalg.norm(position[near] - goal, axis=1), kind="stable")[:ONWARD]]
+    far = np.linalg.norm(position[near] - goal, axis=1)
+    near = near[np.argsort(far, kind="stable")]
+    rest = near[ONWARD : max(ONWARD, int((far <= math.hypot(*reach_of(problem))).sum()))]
+    spread = np.unique(np.linspace(0, len(rest) - 1, min(ONWARD, len(rest))).astype(np.int64))
+    near = np.sort(np.concatenate([near[:ONWARD], rest[spread]]))
     return _look(problem, position[near], departs[near], np.arange(near.size), np.tile(goal, (near.size, 1)))
 
 
@@ -321,28 +321,18 @@ def _outrun(problem: Problem, starts: Array, ends: Array, departs: Array) -> Boo
 
 
 def no_edges(road: Roadmap, problem: Problem) -> str:
-    """Why a roadmap holds no edge, in a sentence; empty where it holds some."""
+    """Why a roadmap holds no edge, in a sentence; empty where it holds some.
+
+    Legs of some of its nodes are looked at again: a law of neighbours may have proposed none.
+    """
     if road.target.size:
         return ""
-    if not road.evaluated:
-        return "the roadmap has no edge: no pair of nodes was looked at; " + ADVICE["depth"]
-    counts = {Status[name.upper()]: count for name, count in road.counts.items() if count}
-    looked = Looked(counts, counts.get(Status.CURRENT_TOO_STRONG, 0))
-    said = f"the roadmap has no edge: of {looked.total:,} pairs, {looked}"
+    some = road.position[np.unique(np.linspace(0, len(road.position) - 1, FRONTIER).astype(np.int64))]
+    departs = np.full(len(some), problem.departure)
+    looked, spacing = _onward(problem, some, departs, road.position, some[0], False)
+    if not looked.total:
+        return f"the roadmap has no edge: its nodes lie at one depth, and one glide changes it; {ADVICE['depth']}"
+    said = f"the roadmap has no edge: of {looked.total:,} legs to the nearest nodes at other depths, {looked}"
     if looked.cause == "spacing":
-        some = road.position[np.linspace(0, len(road.position) - 1, SAMPLED).astype(np.int64)]
-        said += f"; {_apart(_spacing(some, road.position), reach_of(problem))}"
+        said += f"; {_apart(spacing, reach_of(problem))}"
     return f"{said}; {ADVICE[looked.cause]}"
-
-
-def _spacing(some: Array, position: Array) -> tuple[float, float]:
-    """How far apart nodes and the nearest ones at other depths are, across and down: medians [m]."""
-    gaps = []
-    for point in some:
-        others = position[position[:, 2] != point[2]]
-        if len(others):
-            gaps.append(np.abs(others[np.linalg.norm(others - point, axis=1).argmin()] - point))
-    if not gaps:
-        return 0.0, 0.0
-    across, down = np.hypot(*np.array(gaps)[:, :2].T), np.array(gaps)[:, 2]
-    return float(np.median(across)), float(np.median(down))

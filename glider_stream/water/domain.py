@@ -60,7 +60,7 @@ class BoxDomain:
         cure = (
             "with x and y swapped it would lie inside: give X,Y,Z"
             if swapped
-            else "give a point in it, or widen it"
+            else "move it inside, or widen [domain]"
         )
         return f"outside the domain, {bounds}; {cure}"
 
@@ -131,7 +131,7 @@ class GeographicDomain:
             return ""
         (west, east), (south, north) = self.lon, self.lat
         bounds = f"longitude {west:g} to {east:g} and latitude {south:g} to {north:g} degrees"
-        cure = "give a place in it, or widen it"
+        cure = "move it inside, or widen [domain]"
         if self._holds(lat, lon):
             cure = "with longitude and latitude swapped it would lie inside: give LON,LAT,DEPTH"
         return f"outside the domain, {bounds}; {cure}"
