@@ -295,11 +295,11 @@ def _look(problem: Problem, sources: Array, departs: Array, pairs: Index, ends: 
         Status(int(kind)): int(count) for kind, count in zip(*np.unique(status, return_counts=True), strict=True)
     }
     failed = status != Status.CONNECTED
-    outrun = _outrun(problem, sources[pairs], ends, departs[pairs]) & failed
-    return Looked(counts, int((outrun | (status == Status.CURRENT_TOO_STRONG)).sum()))
+    beaten = outrun(problem, sources[pairs], ends, departs[pairs]) & failed
+    return Looked(counts, int((beaten | (status == Status.CURRENT_TOO_STRONG)).sum()))
 
 
-def _outrun(problem: Problem, starts: Array, ends: Array, departs: Array) -> Bools:
+def outrun(problem: Problem, starts: Array, ends: Array, departs: Array) -> Bools:
     """Whether the mean current on the straight line of legs (n, 3) [m] leaves the glider no way along it.
 
     It must make good the current across, and still get ahead: u_along + sqrt(V^2 - u_across^2) > 0, V the

@@ -54,14 +54,13 @@ def test_absolute_altitudes_count(tmp_path):
     ],
 )
 def test_altitudes_above_the_seabed_are_refused(tmp_path, mode, height):
-    with pytest.raises(InputError, match="count from the ground or the seabed .* save them as absolute"):
+    with pytest.raises(InputError, match=r"count from the ground or the seabed .* save them as absolute"):
         kml(tmp_path, f"<Placemark>{LINE.format(mode, 0, height)}</Placemark>")
 
 
 def test_on_the_sea_the_ground_is_the_surface(tmp_path):
-    drawn = kml(
-        tmp_path, f"<Placemark>{LINE.format('<altitudeMode>relativeToGround</altitudeMode>', 0, 0)}</Placemark>"
-    )
+    mode = "<altitudeMode>relativeToGround</altitudeMode>"
+    drawn = kml(tmp_path, f"<Placemark>{LINE.format(mode, 0, 0)}</Placemark>")
     assert [place[2] for place in drawn.places] == [0.0, 0.0]
 
 

@@ -1,4 +1,4 @@
-"""Vehicles' files on their way out and back: lists left by an earlier route, options, lists and targets scored."""
+"""Vehicles' files on their way out and back: lists that an earlier route left, options, lists scored."""
 
 import math
 from dataclasses import replace
@@ -67,9 +67,8 @@ def test_lists_of_another_route_stay(tmp_path):
 def test_waypoints_and_radius_are_options(tmp_path):
     export_path(surfacings(20), tmp_path / "goto_l05.ma", most_waypoints=7, arrival_radius=1500.0)
     lists = [tmp_path / f"goto_l{n:02}.ma" for n in (5, 6, 7)]
-    assert [
-        "num_waypoints(nodim) " + str(n) in file.read_text() for n, file in zip((7, 7, 6), lists, strict=True)
-    ]
+    for count, file in zip((7, 7, 6), lists, strict=True):
+        assert f"num_waypoints(nodim) {count}\n" in file.read_text()
     assert all("list_when_wpt_dist(m) 1500\n" in file.read_text() for file in lists)
     export_path(surfacings(2), tmp_path / "targets", arrival_radius=350.0)
     assert "radius=350 " in (tmp_path / "targets").read_text()
