@@ -67,7 +67,8 @@ def test_on_the_sea_the_ground_is_the_surface(tmp_path):
 def test_a_track_is_a_line(tmp_path):
     track = (
         "<gx:Track><altitudeMode>absolute</altitudeMode><when>2024-11-20T12:00:00Z</when>"
-        "<when>2024-11-20T13:00:00Z</when><gx:coord>18.4 38 0</gx:coord><gx:coord>18.5 38.1 -200</gx:coord></gx:Track>"
+        "<when>2024-11-20T13:00:00Z</when><gx:coord>18.4 38 0</gx:coord>"
+        "<gx:coord>18.5 38.1 -200</gx:coord></gx:Track>"
     )
     places = ((18.4, 38.0, 0.0), (18.5, 38.1, 200.0))
     assert kml(tmp_path, f"<Placemark>{track}</Placemark>").places == places

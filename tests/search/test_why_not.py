@@ -48,7 +48,7 @@ def changed(folder, *changes):
 
 
 def test_the_nearest_node_is_that_of_a_search_of_our_own(problem):
-    """The half beyond the middle is cut off: the nearest place is the best of the other, and when it is reached."""
+    """The half beyond the middle is cut off: the nearest place is the best of the other half."""
     road = roadmap()
     beyond = road.position[:, 0] - road.position[:, 1] > 60.0
     poorer = cut(road, beyond)
