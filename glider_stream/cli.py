@@ -83,9 +83,14 @@ def build(
     from . import planner
     from .base.progress import reporter
 
-    given = {"base": base, "scheduler": scheduler, "checkpoint": checkpoint}
-    job = {name: value for name, value in given.items() if value is not None}
-    run: dict[str, Any] = {"threads": threads, "overrides": overrides, "restart": restart, **job}
+    run: dict[str, Any] = {
+        "threads": threads,
+        "overrides": overrides,
+        "restart": restart,
+        "checkpoint": checkpoint,
+        "scheduler": scheduler,
+        "base": base,
+    }
     empty = ""
     with reporter("build") as progress:
         if shard is not None:
@@ -150,26 +155,34 @@ def query(
     as_json: bool,
 ) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
-    from . import planner
+    from .opened import open
+    from .pilot.export import check_export
+    from .search.surfacing import Surfacing
 
-    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
+    free = most_yos is None and most_hours is None
+    rule = None if free else Surfacing(most_yos, most_hours)
+    said: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
-    export: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if front:
-        alone = not outputs and most_energy is None and thin is None and not export and not as_card
+        alone = not outputs and most_energy is None and thin is None and not asked and not as_card
         if not alone:
             raise click.UsageError(
                 "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
                 "--waypoints and --arrival-radius; leave one of them out"
             )
-        said: Any
-        corners = planner.trade_off(roadmap, start, goal)
+        corners = open(roadmap).trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None, **export)
+        for output in outputs:
+            check_export(output)
+        road = open(roadmap)
+        path = road.query(
+            start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
+        )
         for note in path.notes:
             click.echo(f"note: {note}", err=True)
-        said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
+        said, found = road.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:

@@ -14,6 +14,7 @@ from glider_stream.pilot.route_files import read_drawn
 from glider_stream.pilot.slocum import goto_list
 from glider_stream.pilot.waypoints import Waypoint
 from glider_stream.roadmap.store import write_roadmap
+from glider_stream.search.surfacing import Surfacing
 
 
 def surfacings(count):
@@ -104,7 +105,7 @@ def geographic(tmp_path_factory):
     (folder / "small.toml").write_text(text[: text.index("[query]")])
     road = planner.build(folder / "small.toml")
     write_roadmap(road, folder / "road.h5")
-    path = planner.query(road, (18.4985, 38.0015, 0.0), (18.5015, 37.9985, 0.0), surfacing={"most_yos": 1})
+    path = planner.query(road, (18.4985, 38.0015, 0.0), (18.5015, 37.9985, 0.0), surfacing=Surfacing(most_yos=1))
     assert path.found
     return folder / "road.h5", path
 
