@@ -10,48 +10,53 @@ import math
 
 import numpy as np
 
-from . import steer
 from .cache import entry_point, kernel, making
-from .control import CLIMB, DIVE, horizontal_speed, vertical_speed
+from .control import CLIMB, DIVE, heading_of, horizontal_speed, vertical_speed
 from .edges import BLOCKED, CONNECTED, NO_HIT, no_edge, store
-from .flight import LEFT, advance, hangar, rest, widen
+from .flight import LANE_LEFT, advance, ends_of, hangar, keep_ends, rest, widen
 from .flow import velocity
-from .motion import LANES, X, Y
+from .motion import LANE_X, LANE_Y, LANES
 from .patch import longer
-from .reach import LATEST, checked_leg, ranks
+from .place import Pair, Place
+from .reach import LATEST, LEG_COLUMNS, LEG_EDGE, LEG_NODE, checked_leg, horizon_of, ranks
 from .steer import (
-    GOAL_X,
-    GOAL_Y,
+    AIM_ANGLE,
+    AIM_DIRECTION,
+    AIM_HEADING,
+    AIM_INVERSE,
+    AIM_MISS,
+    AIM_OFF_X,
+    AIM_OFF_Y,
+    AIM_ROWS,
+    AIM_STATE,
+    AIM_TIME,
+    AIM_TURN_A,
+    AIM_TURN_H,
     HIT,
     LANDING_TOLERANCE,
     LOST,
     MAX_TURN,
-    OFF_X,
-    OFF_Y,
     OPEN,
-    STATE,
-    STEER_ROWS,
-    TURN_A,
-    TURN_H,
     broyden,
     take_off,
 )
 
-NODE, STATUS, TIME, COST, GLIDE_ANGLE, HEADING, SPEED, MISS = range(8)
-"""Columns of a followed leg: its target, then the fields of `Edge`."""
-INVERSE = 8
+LEG_STATUS, LEG_TIME, LEG_COST, LEG_ANGLE, LEG_HEADING, LEG_SPEED, LEG_MISS = range(LEG_EDGE, LEG_COLUMNS)
+"""Columns of a followed leg, after its target: the fields of `Edge`."""
+_COLUMNS = range(LEG_COLUMNS, LEG_COLUMNS + 10)
+LEG_INVERSE = _COLUMNS[0]
 """The first of four: d(angle, heading) / d(x, y) of the flow map there."""
-COARSE_X, COARSE_Y = 12, 13
+LEG_COARSE_X, LEG_COARSE_Y = _COLUMNS[4:6]
 """How far its coarse flight lands from its fine one [m]."""
-RATE_A, RATE_H = 14, 15
+LEG_RATE_A, LEG_RATE_H = _COLUMNS[6:8]
 """By how much its control changes with the departure [rad/s]."""
-KNOWN, CHOSEN = 16, 17
-"""Whether the columns from INVERSE on are known; whether it is one of the node's edges, not only followed."""
-COLUMNS = 18
-ORIGIN, SLOT, TURN = 18, 19, 20
+LEG_KNOWN, LEG_CHOSEN = _COLUMNS[8:]
+"""Whether the columns from LEG_INVERSE on are known; whether it is one of the node's edges, not only followed."""
+FOLLOWED_COLUMNS = _COLUMNS.stop
+GUESS_ORIGIN, GUESS_SLOT, GUESS_TURN = range(FOLLOWED_COLUMNS, FOLLOWED_COLUMNS + 3)
 """Columns of a guess beyond those of a leg: its node's place in the batch, its leg's, how far it was turned."""
-GUESS_COLUMNS = 21
-OF, TRIES, PENDING = range(3)
+GUESS_COLUMNS = FOLLOWED_COLUMNS + 3
+SLOT_NODE, SLOT_TRIES, SLOT_PENDING = range(3)
 """Of each leg of a batch: its node's place there, guesses that were flown for it, the guess that waits for it."""
 NOBODYS, NOT_ASKED = -1, -2
 """Instead of the number of a leg: nobody has looked for one to this node; nobody may."""
@@ -76,7 +81,7 @@ BEYOND = 0.05
 HELD = 1.1
 """Legs slower than the slowest edge are followed too, to so many times its time, where edges have a limit."""
 
-_ROWS = range(STEER_ROWS, STEER_ROWS + 10)
+_ROWS = range(AIM_ROWS, AIM_ROWS + 10)
 _MODE, _COUNT, _FIRST, _SHIFT_X, _SHIFT_Y = _ROWS[:5]
 _BASE_X, _BASE_Y, _BY_A_X, _BY_A_Y, _TILT_A = _ROWS[5:]
 FOLLOW_ROWS = _ROWS.stop
@@ -86,37 +91,36 @@ _BASE, _TILTED_A, _TILTED_H, _COARSE, _FINE = 0.0, 1.0, 2.0, 3.0, 4.0
 @kernel
 def _send(medium, position, source, departure, guess, lanes, n):
     """Aim lane n by a guess."""
-    p = source[int(guess[ORIGIN])]
-    lanes[steer.START_X, n], lanes[steer.START_Y, n], lanes[steer.START_Z, n] = position[p]
-    lanes[steer.START_T, n] = departure
-    lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[steer.GOAL_Z, n] = position[int(guess[NODE])]
-    lanes[steer.DIRECTION, n] = CLIMB if guess[GLIDE_ANGLE] > 0.0 else DIVE
-    lanes[steer.ANGLE, n], lanes[steer.HEADING, n] = abs(guess[GLIDE_ANGLE]), guess[HEADING]
+    x, y, z = position[source[int(guess[GUESS_ORIGIN])]]
+    x_q, y_q, z_q = position[int(guess[LEG_NODE])]
+    keep_ends(lanes, n, Pair(Place(x, y, z, departure), Place(x_q, y_q, z_q, departure)))
+    lanes[AIM_DIRECTION, n] = CLIMB if guess[LEG_ANGLE] > 0.0 else DIVE
+    lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n] = abs(guess[LEG_ANGLE]), guess[LEG_HEADING]
     for m in range(4):
-        lanes[steer.INVERSE + m, n] = guess[INVERSE + m]
-    lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = guess[COARSE_X], guess[COARSE_Y]
-    lanes[STATE, n], lanes[_COUNT, n] = OPEN, 0.0
-    lanes[_MODE, n] = _COARSE if guess[KNOWN] else _BASE
+        lanes[AIM_INVERSE + m, n] = guess[LEG_INVERSE + m]
+    lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = guess[LEG_COARSE_X], guess[LEG_COARSE_Y]
+    lanes[AIM_STATE, n], lanes[_COUNT, n] = OPEN, 0.0
+    lanes[_MODE, n] = _COARSE if guess[LEG_KNOWN] else _BASE
     take_off(medium.polar, lanes, n, COARSE_STEP * medium.integration.dt)
 
 
 @kernel
 def _turned(polar, lanes, n, off_x, off_y):
     """Turn lane n's control by what its miss [m] asks for; False where the glide polar ends there."""
-    direction = int(lanes[steer.DIRECTION, n])
-    lanes[OFF_X, n], lanes[OFF_Y, n] = off_x, off_y
-    turn_a = -(lanes[steer.INVERSE, n] * off_x + lanes[steer.INVERSE + 1, n] * off_y)
-    turn_h = -(lanes[steer.INVERSE + 2, n] * off_x + lanes[steer.INVERSE + 3, n] * off_y)
+    direction = int(lanes[AIM_DIRECTION, n])
+    lanes[AIM_OFF_X, n], lanes[AIM_OFF_Y, n] = off_x, off_y
+    turn_a = -(lanes[AIM_INVERSE, n] * off_x + lanes[AIM_INVERSE + 1, n] * off_y)
+    turn_h = -(lanes[AIM_INVERSE + 2, n] * off_x + lanes[AIM_INVERSE + 3, n] * off_y)
     if not abs(turn_a) + abs(turn_h) < math.inf:
         return False
     shorten = min(1.0, MAX_TURN / max(abs(turn_a), abs(turn_h), MAX_TURN))
     low, high = polar.shallowest[direction], polar.steepest[direction]
-    angle = min(max(lanes[steer.ANGLE, n] + shorten * turn_a, low), high)
-    lanes[TURN_A, n], lanes[TURN_H, n] = angle - lanes[steer.ANGLE, n], shorten * turn_h
-    if lanes[TURN_A, n] == 0.0 and turn_a != 0.0 and lanes[_COUNT, n] > 0.0:
+    angle = min(max(lanes[AIM_ANGLE, n] + shorten * turn_a, low), high)
+    lanes[AIM_TURN_A, n], lanes[AIM_TURN_H, n] = angle - lanes[AIM_ANGLE, n], shorten * turn_h
+    if lanes[AIM_TURN_A, n] == 0.0 and turn_a != 0.0 and lanes[_COUNT, n] > 0.0:
         return False
-    lanes[steer.ANGLE, n] = angle
-    lanes[steer.HEADING, n] += shorten * turn_h
+    lanes[AIM_ANGLE, n] = angle
+    lanes[AIM_HEADING, n] += shorten * turn_h
     return True
 
 
@@ -126,23 +130,23 @@ def _measured(polar, lanes, n, off_x, off_y, dt):
     mode = lanes[_MODE, n]
     if mode == _BASE:
         lanes[_BASE_X, n], lanes[_BASE_Y, n] = off_x, off_y
-        steepest = polar.steepest[int(lanes[steer.DIRECTION, n])]
-        lanes[_TILT_A, n] = TILT if lanes[steer.ANGLE, n] + TILT <= steepest else -TILT
-        lanes[steer.ANGLE, n] += lanes[_TILT_A, n]
+        steepest = polar.steepest[int(lanes[AIM_DIRECTION, n])]
+        lanes[_TILT_A, n] = TILT if lanes[AIM_ANGLE, n] + TILT <= steepest else -TILT
+        lanes[AIM_ANGLE, n] += lanes[_TILT_A, n]
         lanes[_MODE, n] = _TILTED_A
     elif mode == _TILTED_A:
         lanes[_BY_A_X, n] = (off_x - lanes[_BASE_X, n]) / lanes[_TILT_A, n]
         lanes[_BY_A_Y, n] = (off_y - lanes[_BASE_Y, n]) / lanes[_TILT_A, n]
-        lanes[steer.ANGLE, n] -= lanes[_TILT_A, n]
-        lanes[steer.HEADING, n] += TILT
+        lanes[AIM_ANGLE, n] -= lanes[_TILT_A, n]
+        lanes[AIM_HEADING, n] += TILT
         lanes[_MODE, n] = _TILTED_H
     else:
         x_h, y_h = (off_x - lanes[_BASE_X, n]) / TILT, (off_y - lanes[_BASE_Y, n]) / TILT
         x_a, y_a = lanes[_BY_A_X, n], lanes[_BY_A_Y, n]
-        lanes[steer.HEADING, n] -= TILT
+        lanes[AIM_HEADING, n] -= TILT
         det = x_a * y_h - x_h * y_a
-        lanes[steer.INVERSE, n], lanes[steer.INVERSE + 1, n] = y_h / det, -x_h / det
-        lanes[steer.INVERSE + 2, n], lanes[steer.INVERSE + 3, n] = -y_a / det, x_a / det
+        lanes[AIM_INVERSE, n], lanes[AIM_INVERSE + 1, n] = y_h / det, -x_h / det
+        lanes[AIM_INVERSE + 2, n], lanes[AIM_INVERSE + 3, n] = -y_a / det, x_a / det
         lanes[_MODE, n] = _COARSE
         miss = math.hypot(lanes[_BASE_X, n], lanes[_BASE_Y, n])
         lanes[_FIRST, n], lanes[_COUNT, n] = miss, 1.0
@@ -153,13 +157,15 @@ def _measured(polar, lanes, n, off_x, off_y, dt):
 
 
 @kernel
-def _landed(polar, lanes, n, dt):
+def _landed(polar, integration, lanes, n):
     """Lane n has landed: on its target, HIT; nowhere near, LOST; else it is turned, and flies again."""
-    off_x, off_y = lanes[X, n] - lanes[GOAL_X, n], lanes[Y, n] - lanes[GOAL_Y, n]
-    lanes[STATE, n] = OPEN
+    dt = integration.dt
+    _, goal = ends_of(lanes, n)
+    off_x, off_y = lanes[LANE_X, n] - goal.x, lanes[LANE_Y, n] - goal.y
+    lanes[AIM_STATE, n] = OPEN
     if lanes[_MODE, n] < _COARSE:
         if not _measured(polar, lanes, n, off_x, off_y, dt):
-            lanes[STATE, n] = LOST
+            lanes[AIM_STATE, n] = LOST
             rest(lanes, n)
         return
     fine = lanes[_MODE, n] == _FINE
@@ -171,20 +177,20 @@ def _landed(polar, lanes, n, dt):
     if first_fine:
         # the coarse flight with this control would have landed on the target, its shift taken off
         lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = lanes[_SHIFT_X, n] - off_x, lanes[_SHIFT_Y, n] - off_y
-    if fine and miss <= LANDING_TOLERANCE:
-        lanes[steer.MISS, n] = miss
-        lanes[steer.HEADING, n] = math.atan2(math.sin(lanes[steer.HEADING, n]), math.cos(lanes[steer.HEADING, n]))
-        lanes[STATE, n] = HIT
+    if fine and miss <= LANDING_TOLERANCE and miss < integration.tolerance:
+        lanes[AIM_MISS, n] = miss
+        lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
+        lanes[AIM_STATE, n] = HIT
         rest(lanes, n)
         return
     if count == 0.0:
         lanes[_FIRST, n] = miss
     elif not first_fine:
-        broyden(lanes, n, off_x - lanes[OFF_X, n], off_y - lanes[OFF_Y, n])
+        broyden(lanes, n, off_x - lanes[AIM_OFF_X, n], off_y - lanes[AIM_OFF_Y, n])
     astray = not fine and count == GIVE_UP and miss > 0.25 * lanes[_FIRST, n]
     late = count == (MOST_FINE if fine else MOST_COARSE) - 1.0
     if astray or late or not miss < math.inf or not _turned(polar, lanes, n, off_x, off_y):
-        lanes[STATE, n] = LOST
+        lanes[AIM_STATE, n] = LOST
         rest(lanes, n)
         return
     lanes[_COUNT, n] += 1.0
@@ -198,9 +204,9 @@ def _landed(polar, lanes, n, dt):
 def _fly(medium, position, source, departure, guesses, count, legs, lanes):
     """Fly all guesses to their ends; what is met, and cheaper than what its leg was, becomes the leg."""
     flying = np.zeros(LANES, np.int64)
-    horizon = medium.integration.dt * medium.integration.steps
+    horizon = horizon_of(medium)
     following, busy = 0, 0
-    lanes[LEFT] = math.inf
+    lanes[LANE_LEFT] = math.inf
     for n in range(LANES):
         if following < count:
             flying[n] = following
@@ -211,16 +217,16 @@ def _fly(medium, position, source, departure, guesses, count, legs, lanes):
         advance(medium.flow, lanes)
         widen(lanes)
         for n in range(LANES):
-            if lanes[LEFT, n] > 0.0:
+            if lanes[LANE_LEFT, n] > 0.0:
                 continue
-            _landed(medium.polar, lanes, n, medium.integration.dt)
-            leg = legs[int(guesses[flying[n], SLOT])]
+            _landed(medium.polar, medium.integration, lanes, n)
+            leg = legs[int(guesses[flying[n], GUESS_SLOT])]
             latest = LATEST * horizon
-            if leg[STATUS] == CONNECTED and lanes[_MODE, n] == _FINE:
-                latest = leg[TIME]
-            if lanes[STATE, n] == OPEN and lanes[steer.TIME, n] <= latest:
+            if leg[LEG_STATUS] == CONNECTED and lanes[_MODE, n] == _FINE:
+                latest = leg[LEG_TIME]
+            if lanes[AIM_STATE, n] == OPEN and lanes[AIM_TIME, n] <= latest:
                 continue
-            if lanes[STATE, n] == HIT and lanes[steer.TIME, n] <= horizon:
+            if lanes[AIM_STATE, n] == HIT and lanes[AIM_TIME, n] <= horizon:
                 _take(medium, lanes, n, leg)
             if following < count:
                 flying[n] = following
@@ -234,19 +240,19 @@ def _fly(medium, position, source, departure, guesses, count, legs, lanes):
 @kernel
 def _take(medium, lanes, n, leg):
     """Make the leg of what lane n has found, where that is better."""
-    if leg[STATUS] == CONNECTED and lanes[steer.TIME, n] >= leg[TIME]:
+    if leg[LEG_STATUS] == CONNECTED and lanes[AIM_TIME, n] >= leg[LEG_TIME]:
         return
     edge = checked_leg(medium, lanes, n)
-    if not (edge.status == CONNECTED or (edge.status == BLOCKED and leg[STATUS] == NO_HIT)):
+    if not (edge.status == CONNECTED or (edge.status == BLOCKED and leg[LEG_STATUS] == NO_HIT)):
         return
-    store(leg[STATUS:INVERSE], edge)
+    store(leg[LEG_STATUS:LEG_INVERSE], edge)
     if edge.status == BLOCKED:  # its control is followed all the same: the way may open
-        climbs = lanes[steer.DIRECTION, n] == CLIMB
-        leg[GLIDE_ANGLE] = lanes[steer.ANGLE, n] if climbs else -lanes[steer.ANGLE, n]
-        leg[HEADING] = lanes[steer.HEADING, n]
+        climbs = lanes[AIM_DIRECTION, n] == CLIMB
+        leg[LEG_ANGLE] = lanes[AIM_ANGLE, n] if climbs else -lanes[AIM_ANGLE, n]
+        leg[LEG_HEADING] = lanes[AIM_HEADING, n]
     for m in range(4):
-        leg[INVERSE + m] = lanes[steer.INVERSE + m, n]
-    leg[COARSE_X], leg[COARSE_Y], leg[KNOWN] = lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n], 1.0
+        leg[LEG_INVERSE + m] = lanes[AIM_INVERSE + m, n]
+    leg[LEG_COARSE_X], leg[LEG_COARSE_Y], leg[LEG_KNOWN] = lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n], 1.0
 
 
 @kernel
@@ -256,37 +262,37 @@ def _neighbours_guess(polar, position, z_p, leg, over_x, over_y, r, guess):
     The leg, which began at the height z_p [m], is flown on, or less far, to r's depth at its last velocity over
     ground [m/s], and turned by what it then misses.
     """
-    direction = CLIMB if leg[GLIDE_ANGLE] > 0.0 else DIVE
-    x, y, z = position[int(leg[NODE])]
+    direction = CLIMB if leg[LEG_ANGLE] > 0.0 else DIVE
+    x, y, z = position[int(leg[LEG_NODE])]
     x_r, y_r, z_r = position[r]
-    angle, heading = abs(leg[GLIDE_ANGLE]), leg[HEADING]
+    angle, heading = abs(leg[LEG_ANGLE]), leg[LEG_HEADING]
     since = (2.0 * direction - 1.0) * (z_r - z) / vertical_speed(polar, direction, angle)
     off_x, off_y = x + since * over_x - x_r, y + since * over_y - y_r
-    turn_a = -(leg[INVERSE] * off_x + leg[INVERSE + 1] * off_y)
-    turn_h = -(leg[INVERSE + 2] * off_x + leg[INVERSE + 3] * off_y)
+    turn_a = -(leg[LEG_INVERSE] * off_x + leg[LEG_INVERSE + 1] * off_y)
+    turn_h = -(leg[LEG_INVERSE + 2] * off_x + leg[LEG_INVERSE + 3] * off_y)
     turn = max(abs(turn_a), abs(turn_h))
     low, high = polar.shallowest[direction], polar.steepest[direction]
     if not turn < FURTHEST or angle + turn_a < low - BEYOND or angle + turn_a > high + BEYOND:
         return math.inf
     angle = min(max(angle + turn_a, low), high)
-    for m in range(COLUMNS):  # not a slice, which makes a copy
+    for m in range(FOLLOWED_COLUMNS):  # not a slice, which makes a copy
         guess[m] = leg[m]
-    guess[NODE], guess[TURN] = r, turn
-    guess[GLIDE_ANGLE], guess[HEADING] = (angle if direction == CLIMB else -angle), heading + turn_h
+    guess[LEG_NODE], guess[GUESS_TURN] = r, turn
+    guess[LEG_ANGLE], guess[LEG_HEADING] = (angle if direction == CLIMB else -angle), heading + turn_h
     return abs(z_r - z_p) / vertical_speed(polar, direction, angle)
 
 
 @kernel
 def _over_ground(medium, position, z_p, departure, leg):
     """A leg's velocity over ground [m/s] where it ends."""
-    direction = CLIMB if leg[GLIDE_ANGLE] > 0.0 else DIVE
-    x, y, z = position[int(leg[NODE])]
-    angle = abs(leg[GLIDE_ANGLE])
+    direction = CLIMB if leg[LEG_ANGLE] > 0.0 else DIVE
+    x, y, z = position[int(leg[LEG_NODE])]
+    angle = abs(leg[LEG_ANGLE])
     u, v = velocity(
         medium.flow, x, y, z, departure + abs(z - z_p) / vertical_speed(medium.polar, direction, angle)
     )
     along = horizontal_speed(medium.polar, direction, angle)
-    return u + along * math.cos(leg[HEADING]), v + along * math.sin(leg[HEADING])
+    return u + along * math.cos(leg[LEG_HEADING]), v + along * math.sin(leg[LEG_HEADING])
 
 
 @making
@@ -296,12 +302,12 @@ def _slowest_edges(legs, slots, count, nodes, limit, horizon):
     if limit == 0:
         return cut
     met = np.zeros((nodes, 2), np.int64)
-    for k in ranks(legs[:count, TIME].copy()):
-        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
-        if legs[k, STATUS] == CONNECTED:
+    for k in ranks(legs[:count, LEG_TIME].copy()):
+        n, direction = slots[k, SLOT_NODE], CLIMB if legs[k, LEG_ANGLE] > 0.0 else DIVE
+        if legs[k, LEG_STATUS] == CONNECTED:
             met[n, direction] += 1
             if met[n, direction] == limit:
-                cut[n, direction] = legs[k, TIME]
+                cut[n, direction] = legs[k, LEG_TIME]
     return cut
 
 
@@ -315,46 +321,46 @@ def _neighbours_guesses(
     """
     asked = 0
     for k in range(count):
-        slots[k, PENDING] = -1
+        slots[k, SLOT_PENDING] = -1
     for k in range(before.size):
-        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
+        n, direction = slots[k, SLOT_NODE], CLIMB if legs[k, LEG_ANGLE] > 0.0 else DIVE
         # NaN, of blocked ones, differs from itself
-        new = legs[k, STATUS] != NO_HIT and legs[k, TIME] != before[k]
-        if not new or legs[k, TIME] > HELD * cut[n, direction]:
+        new = legs[k, LEG_STATUS] != NO_HIT and legs[k, LEG_TIME] != before[k]
+        if not new or legs[k, LEG_TIME] > HELD * cut[n, direction]:
             continue
         z_p = position[source[n], 2]
         over_x, over_y = _over_ground(medium, position, z_p, departure, legs[k])
         for m in range(near.shape[1]):
-            r = near[int(legs[k, NODE]), m]
+            r = near[int(legs[k, LEG_NODE]), m]
             slot = where[n, r]
             if (2.0 * direction - 1.0) * (position[r, 2] - z_p) <= 0.0 or slot == NOT_ASKED:
                 continue
-            if slot >= 0 and slots[slot, TRIES] >= MOST_TRIES:
+            if slot >= 0 and slots[slot, SLOT_TRIES] >= MOST_TRIES:
                 continue
             guesses = longer(guesses, asked + 1)
             guess = guesses[asked]
             time = _neighbours_guess(medium.polar, position, z_p, legs[k], over_x, over_y, r, guess)
-            met = slot >= 0 and legs[slot, STATUS] == CONNECTED
-            if not time <= (BETTER * legs[slot, TIME] if met else LATEST * cut[n, direction]):
+            met = slot >= 0 and legs[slot, LEG_STATUS] == CONNECTED
+            if not time <= (BETTER * legs[slot, LEG_TIME] if met else LATEST * cut[n, direction]):
                 continue
             if slot < 0:
                 slot = count
                 count += 1
                 legs, slots = longer(legs, count), longer(slots, count)
-                store(legs[slot, STATUS:INVERSE], no_edge(NO_HIT))
-                legs[slot, INVERSE:] = 0.0
-                legs[slot, NODE], legs[slot, GLIDE_ANGLE] = r, legs[k, GLIDE_ANGLE]
-                slots[slot, OF], slots[slot, TRIES], slots[slot, PENDING] = n, 0, -1
+                store(legs[slot, LEG_STATUS:LEG_INVERSE], no_edge(NO_HIT))
+                legs[slot, LEG_INVERSE:] = 0.0
+                legs[slot, LEG_NODE], legs[slot, LEG_ANGLE] = r, legs[k, LEG_ANGLE]
+                slots[slot, SLOT_NODE], slots[slot, SLOT_TRIES], slots[slot, SLOT_PENDING] = n, 0, -1
                 where[n, r] = slot
-            guess[ORIGIN], guess[SLOT] = n, slot
-            other = slots[slot, PENDING]
+            guess[GUESS_ORIGIN], guess[GUESS_SLOT] = n, slot
+            other = slots[slot, SLOT_PENDING]
             if other < 0:
-                slots[slot, PENDING] = asked
+                slots[slot, SLOT_PENDING] = asked
                 asked += 1
-            elif guess[TURN] < guesses[other, TURN]:
+            elif guess[GUESS_TURN] < guesses[other, GUESS_TURN]:
                 guesses[other] = guess
     for k in range(asked):
-        slots[int(guesses[k, SLOT]), TRIES] += 1
+        slots[int(guesses[k, GUESS_SLOT]), SLOT_TRIES] += 1
     return legs, slots, count, guesses, asked
 
 
@@ -376,34 +382,34 @@ def follow_nodes(
 ):  # fmt: skip
     """The legs from the nodes source[first:last] at a departure [s], by those that they had `since` [s] before.
 
-    `near` (nodes, k): nodes beside each, to which its legs lead on. `held` (n, any, COLUMNS), `holds` (n,) legs
+    `near` (nodes, k): nodes beside each, to which its legs lead on. `held` (n, any, FOLLOWED_COLUMNS), `holds` (n,) legs
     of each. To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with a `limit`
-    the fastest so many of each direction are CHOSEN. All pairs that were looked at, by rising node, into rows
-    of `found` (n, capacity, COLUMNS); a count above the capacity says how much is needed.
+    the fastest so many of each direction are LEG_CHOSEN. All pairs that were looked at, by rising node, into rows
+    of `found` (n, capacity, FOLLOWED_COLUMNS); a count above the capacity says how much is needed.
     """
-    horizon = medium.integration.dt * medium.integration.steps
+    horizon = horizon_of(medium)
     lanes = hangar(FOLLOW_ROWS)
     where = _asked_for(indptr, target, first, last, position.shape[0])
     followed = np.sum(holds[first:last])
-    legs = np.empty((2 * followed + 1, COLUMNS))
+    legs = np.empty((2 * followed + 1, FOLLOWED_COLUMNS))
     slots = np.zeros((2 * followed + 1, 3), np.int64)
     guesses = np.empty((followed + 1, GUESS_COLUMNS))
     count = 0
     for n in range(last - first):
         for k in range(holds[first + n]):
-            guesses[count, :COLUMNS] = held[first + n, k]
-            guesses[count, ORIGIN], guesses[count, SLOT] = n, count
+            guesses[count, :FOLLOWED_COLUMNS] = held[first + n, k]
+            guesses[count, GUESS_ORIGIN], guesses[count, GUESS_SLOT] = n, count
             _moved_on(medium.polar, guesses[count], since)
             legs[count] = held[first + n, k]
-            store(legs[count, STATUS:INVERSE], no_edge(NO_HIT))
-            legs[count, GLIDE_ANGLE] = held[first + n, k, GLIDE_ANGLE]
-            slots[count, OF], slots[count, TRIES] = n, 1
-            where[n, int(legs[count, NODE])] = count
+            store(legs[count, LEG_STATUS:LEG_INVERSE], no_edge(NO_HIT))
+            legs[count, LEG_ANGLE] = held[first + n, k, LEG_ANGLE]
+            slots[count, SLOT_NODE], slots[count, SLOT_TRIES] = n, 1
+            where[n, int(legs[count, LEG_NODE])] = count
             count += 1
     asked = count
     cut = np.full((last - first, 2), horizon)
     while asked > 0:
-        before = legs[:count, TIME].copy()
+        before = legs[:count, LEG_TIME].copy()
         _fly(medium, position, source[first:last], departure, guesses, asked, legs, lanes)
         cut = _slowest_edges(legs, slots, count, last - first, limit, horizon)
         legs, slots, count, guesses, asked = _neighbours_guesses(
@@ -416,12 +422,12 @@ def follow_nodes(
 @kernel
 def _moved_on(polar, guess, since):
     """Move a leg's control on as it moved before."""
-    climbs = guess[GLIDE_ANGLE] > 0.0
+    climbs = guess[LEG_ANGLE] > 0.0
     direction = CLIMB if climbs else DIVE
     low, high = polar.shallowest[direction], polar.steepest[direction]
-    angle = min(max(abs(guess[GLIDE_ANGLE]) + since * guess[RATE_A], low), high)
-    guess[GLIDE_ANGLE] = angle if climbs else -angle
-    guess[HEADING] += since * guess[RATE_H]
+    angle = min(max(abs(guess[LEG_ANGLE]) + since * guess[LEG_RATE_A], low), high)
+    guess[LEG_ANGLE] = angle if climbs else -angle
+    guess[LEG_HEADING] += since * guess[LEG_RATE_H]
 
 
 @kernel
@@ -431,13 +437,13 @@ def _note_rates(legs, since, held, holds, first, last):
     for n in range(first, last):
         for k in range(holds[n]):
             leg, before = legs[at], held[n, k]
-            turn_a = abs(leg[GLIDE_ANGLE]) - abs(before[GLIDE_ANGLE])
-            turn_h = leg[HEADING] - before[HEADING]
+            turn_a = abs(leg[LEG_ANGLE]) - abs(before[LEG_ANGLE])
+            turn_h = leg[LEG_HEADING] - before[LEG_HEADING]
             turn_h = math.atan2(math.sin(turn_h), math.cos(turn_h))
-            leg[RATE_A], leg[RATE_H] = 0.0, 0.0
+            leg[LEG_RATE_A], leg[LEG_RATE_H] = 0.0, 0.0
             # further it is another leg, and not the same, moved on
             if abs(turn_a) < MAX_TURN and abs(turn_h) < MAX_TURN:
-                leg[RATE_A], leg[RATE_H] = turn_a / since, turn_h / since
+                leg[LEG_RATE_A], leg[LEG_RATE_H] = turn_a / since, turn_h / since
             at += 1
 
 
@@ -446,14 +452,14 @@ def _hand_over(legs, slots, count, limit, cut, counts, found, first, last):
     """Which of the legs are edges, and all by rising node into `found`."""
     chosen = np.zeros((last - first, 2), np.int64)
     # costs rise with times; NaN, of what is not connected, sorts last
-    for k in ranks(legs[:count, TIME].copy()):
-        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
-        legs[k, CHOSEN] = 1.0 if limit == 0 or chosen[n, direction] < limit else 0.0
+    for k in ranks(legs[:count, LEG_TIME].copy()):
+        n, direction = slots[k, SLOT_NODE], CLIMB if legs[k, LEG_ANGLE] > 0.0 else DIVE
+        legs[k, LEG_CHOSEN] = 1.0 if limit == 0 or chosen[n, direction] < limit else 0.0
         chosen[n, direction] += 1
     counts[first:last] = 0
-    for k in ranks(legs[:count, NODE].copy()):
-        n, direction = slots[k, OF], CLIMB if legs[k, GLIDE_ANGLE] > 0.0 else DIVE
-        if legs[k, CHOSEN] == 0.0 and not legs[k, TIME] <= HELD * cut[n, direction]:
+    for k in ranks(legs[:count, LEG_NODE].copy()):
+        n, direction = slots[k, SLOT_NODE], CLIMB if legs[k, LEG_ANGLE] > 0.0 else DIVE
+        if legs[k, LEG_CHOSEN] == 0.0 and not legs[k, LEG_TIME] <= HELD * cut[n, direction]:
             continue
         if counts[first + n] < found.shape[1]:
             found[first + n, counts[first + n]] = legs[k]

@@ -9,9 +9,11 @@ from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Index
 from ..base.threads import in_parallel
-from ..kernels import follow, reach
-from ..kernels.edges import Status
+from ..kernels import follow
+from ..kernels.connect import Pairs
+from ..kernels.edges import EDGE_COLUMNS, STATUS, TIME, Status
 from ..kernels.patch import MAX_LEVELS
+from ..kernels.reach import LEG_COLUMNS, LEG_EDGE, LEG_NODE, answer, quick_statuses
 from .evaluator import NODES_AT_ONCE, Evaluator
 from .neighbours import as_csr
 from .pairs import Found, NeighbourLegs, ReachableLegs
@@ -28,7 +30,7 @@ ROOM = 1.25
 
 @dataclass(frozen=True)
 class Held:
-    """Legs of some nodes at one departure, as `kernels.follow` has them: rows (n, room, COLUMNS), counts (n,)."""
+    """Legs of some nodes at one departure, as `kernels.follow` has them: rows (n, room, FOLLOWED_COLUMNS), counts (n,)."""
 
     rows: Array
     counts: Index
@@ -110,14 +112,14 @@ class Follower:
         counts = np.zeros(len(source), np.int64)
         how = evaluator.medium, self.position, self.near, source, departure, since, indptr, target, limit
         while True:
-            rows = np.empty((len(source), room, follow.COLUMNS))
+            rows = np.empty((len(source), room, follow.FOLLOWED_COLUMNS))
             task = partial(follow.follow_nodes, *how, held.rows, held.counts, counts, rows)
             in_parallel(task, len(source), NODES_AT_ONCE)
             if counts.max(initial=0) <= room:
                 break
             room = int(counts.max())
         there = np.arange(room) < counts[:, None]
-        going = there & (rows[:, :, follow.STATUS] != Status.NO_HIT)
+        going = there & (rows[:, :, follow.LEG_STATUS] != Status.NO_HIT)
         pairs = self._pairs(evaluator, source, departure, rows, there, indptr, target)
         return pairs, _packed(rows, going)
 
@@ -125,35 +127,32 @@ class Follower:
         self, evaluator: Evaluator, source: Index, departure: float, rows: Array, there: Array, *asked: Index
     ) -> Found:
         """All pairs that were looked at; of a neighbour law all that it names."""
-        edges = there & (rows[:, :, follow.CHOSEN] > 0)
+        edges = there & (rows[:, :, follow.LEG_CHOSEN] > 0)
         chosen = rows[edges]
-        outcomes = np.ascontiguousarray(chosen[:, follow.STATUS : follow.INVERSE])
-        outcomes[outcomes[:, 0] != Status.CONNECTED, 1:] = np.nan
+        outcomes = np.ascontiguousarray(chosen[:, LEG_EDGE:LEG_COLUMNS])
+        outcomes[outcomes[:, STATUS] != Status.CONNECTED, TIME:] = np.nan
         first = np.concatenate([[0], np.cumsum(edges.sum(axis=1))]).astype(np.int64)
-        found = first, chosen[:, follow.NODE].astype(np.int64), outcomes
+        found = first, chosen[:, LEG_NODE].astype(np.int64), outcomes
         indptr, target = asked
         if not indptr.size:
             return Found(*found)
-        result = np.empty((target.size, len(outcomes.T)))
-        departs = np.full(len(self.position), departure)
-        quick = partial(
-            reach.quick_statuses, evaluator.medium, self.position, departs, source, indptr, target, result
-        )
-        in_parallel(quick, source.size, NODES_AT_ONCE)
-        in_parallel(partial(reach.answer, indptr, target, *found, result), source.size, NODES_AT_ONCE)
+        result = np.empty((target.size, EDGE_COLUMNS))
+        every = Pairs(self.position, np.full(len(self.position), departure), source, indptr, target)
+        in_parallel(partial(quick_statuses, evaluator.medium, every, result), source.size, NODES_AT_ONCE)
+        in_parallel(partial(answer, every, *found, result), source.size, NODES_AT_ONCE)
         return Found(indptr, target, result)
 
 
 def _held(found: Found) -> Held:
     """Legs that a fan has found, as they are followed: of their flow maps nothing is known."""
     counts = np.diff(found.indptr)
-    rows = np.zeros((len(counts), int(counts.max(initial=0)), follow.COLUMNS))
+    rows = np.zeros((len(counts), int(counts.max(initial=0)), follow.FOLLOWED_COLUMNS))
     there = np.arange(rows.shape[1]) < counts[:, None]
-    flat = np.zeros((found.target.size, follow.COLUMNS))
-    flat[:, follow.NODE] = found.target
-    flat[:, follow.STATUS : follow.INVERSE] = found.outcomes
+    flat = np.zeros((found.target.size, follow.FOLLOWED_COLUMNS))
+    flat[:, LEG_NODE] = found.target
+    flat[:, LEG_EDGE:LEG_COLUMNS] = found.outcomes
     rows[there] = flat
-    return _packed(rows, there & (rows[:, :, follow.STATUS] == Status.CONNECTED))
+    return _packed(rows, there & (rows[:, :, follow.LEG_STATUS] == Status.CONNECTED))
 
 
 def _packed(rows: Array, kept: Array) -> Held:
