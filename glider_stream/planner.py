@@ -19,11 +19,12 @@ from .pilot.lint import lint as lint_file
 from .pilot.score import Score
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
-from .roadmap.builder import Progress, build_roadmap, node_positions
+from .roadmap.builder import Progress, build_roadmap, build_slices, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
-from .roadmap.store import read_roadmap
+from .roadmap.slices import SlicedRoadmap
+from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .search.path import Path
 from .search.surfacing import Surfacing
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from .water.describe import Description, Place
     from .water.ocean import Names
 
-AnyRoadmap = str | File | Roadmap | OpenedRoadmap
+AnyRoadmap = str | File | Roadmap | SlicedRoadmap | OpenedRoadmap
 """A roadmap file's name, a roadmap, or an opened one, which keeps what questions need."""
 
 
@@ -53,9 +54,9 @@ def build(
     restart: bool = False,
     checkpoint: float | None = None,
     scheduler: str | None = None,
-    base: str | File | Roadmap | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
-) -> Roadmap:
+) -> Roadmap | SlicedRoadmap:
     """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says.
 
     A build into a file goes on where an earlier one of the same was stopped, or begins anew with `restart`;
@@ -68,9 +69,11 @@ def build(
         file = {"restart": restart, "checkpoint": checkpoint, "scheduler": scheduler, "base": base}
         given = [name for name, value in file.items() if value not in (None, False)]
         require(not given, f"{', '.join(given)} need an output file; name one")
-        return build_roadmap(resolved.problem(), threads, progress)
+        problem = resolved.problem()
+        make = build_roadmap if len(problem.departures) == 1 else build_slices
+        return make(problem, threads, progress)
     _build(resolved, output, threads, progress, None, restart, checkpoint, scheduler, base)
-    return read_roadmap(output)
+    return read_any_roadmap(output)
 
 
 def build_part(
@@ -83,7 +86,7 @@ def build_part(
     restart: bool = False,
     checkpoint: float | None = None,
     scheduler: str | None = None,
-    base: str | File | Roadmap | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> None:
     """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; else as `build`."""
@@ -100,7 +103,7 @@ def _build(
     restart: bool,
     checkpoint: float | None,
     address: str | None,
-    older: str | File | Roadmap | None,
+    older: str | File | Roadmap | SlicedRoadmap | None,
 ) -> None:
     job: dict[str, Any] = {"restart": restart, "shard": None if shard is None else shard_of(shard)}
     if checkpoint is not None:
@@ -135,13 +138,13 @@ def _resolved(scenario: str | File | Scenario, output: str | File | None, overri
     return read_scenario(scenario, overrides)
 
 
-def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
+def merge(parts: Sequence[str | File], output: str | File) -> Roadmap | SlicedRoadmap:
     """One roadmap of the parts that builds with `shard` wrote."""
     merge_parts(parts, output)
-    return read_roadmap(output)
+    return read_any_roadmap(output)
 
 
-def info(roadmap: AnyRoadmap) -> Roadmap:
+def info(roadmap: AnyRoadmap) -> Roadmap | SlicedRoadmap:
     """A roadmap from its file; printed, it says what it is."""
     return open_roadmap(roadmap).roadmap
 

@@ -1,5 +1,6 @@
 """Scenarios: TOML into objects, every key checked; the problem that they make."""
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -45,11 +46,13 @@ SECTIONS = (
     "integration",
     "cost",
     "query",
+    "departures",
 )
-OPTIONAL = ("terrain", "query")
+OPTIONAL = ("terrain", "query", "departures")
 
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
+MOST_SLICES = 10_000
 FILES = {"file", "bathymetry", "keep_out"}
 """Keys whose values name files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
@@ -81,6 +84,37 @@ class QueryPoints:
 
 
 @dataclass(frozen=True)
+class Departures:
+    """The departures of a roadmap's slices [s]: the `first`, one `every` so many seconds after it, the `last`."""
+
+    first: float
+    last: float
+    every: float
+
+    def __post_init__(self) -> None:
+        for name in ("first", "last"):
+            value = getattr(self, name)
+            fits = abs(value) <= LONGEST
+            require(fits, f"`departures.{name}` must be within {LONGEST:g} s of 0; got {value:g}")
+        rises = self.first <= self.last
+        require(rises, f"`departures.last` must not be before `first`, {self.first:g} s; got {self.last:g}")
+        require(self.every > 0, f"`departures.every` must be above 0 s; got {self.every:g}")
+        count = (self.last - self.first) / self.every + 1
+        least = (self.last - self.first) / (MOST_SLICES - 1)
+        require(
+            count <= MOST_SLICES,
+            f"`departures.every` = {self.every:g} s makes {count:,.0f} departures, more than {MOST_SLICES:,}; "
+            f"make it at least {least:.6g}",
+        )
+
+    def times(self) -> tuple[float, ...]:
+        """All of them, rising."""
+        steps = math.floor((self.last - self.first) / self.every * (1 + 1e-12))
+        times = [min(self.first + n * self.every, self.last) for n in range(steps + 1)]
+        return tuple(times) if times[-1] == self.last else (*times, self.last)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """One block each; `text` is the resolved TOML."""
 
@@ -95,6 +129,7 @@ class Scenario:
     cost: Cost
     query: QueryPoints | None
     text: str
+    departures: Departures | None = None
 
     def problem(self) -> Problem:
         """Build flow, terrain and glide polar, and put everything together."""
@@ -111,7 +146,7 @@ class Scenario:
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
         words += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
-            words += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
+            words += f"; it changes with time, and legs hold for {self._when()}"
         sampler = self.sampler
         if isinstance(sampler, YoSampler):
             sampler = sampler.for_glide(float(table.best_angle.max()))
@@ -133,12 +168,35 @@ class Scenario:
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
             departs=self._departs(),
             domain=self.domain,
+            slices=self._slices(flow),
         )
 
     @property
     def departure(self) -> float:
         """When gliders leave their nodes [s]."""
         return 0.0 if self.query is None else self.query.departure
+
+    def _when(self) -> str:
+        several = self.departures is not None and self.departures.first < self.departures.last
+        return "the departures of their slices" if several else f"departure at {self.departure:g} s"
+
+    def _slices(self, flow: Flow) -> tuple[float, ...]:
+        """The departures of the roadmap's slices [s]; none where the scenario has no [departures]."""
+        if self.departures is None:
+            return ()
+        first, last, known = self.departures.first, self.departures.last, flow.extent
+        why = "[departures] makes slices of a flow that changes, and this one does not; remove that section"
+        require(not is_steady(flow), why)
+        span = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
+        for name, value in (("first", first), ("last", last)):
+            within = known.t_lo <= value <= known.t_hi
+            require(within, f"`departures.{name}` = {value:g} s lies outside {span}; choose one of them")
+        require(
+            first <= self.departure <= last,
+            f"`query.departure` = {self.departure:g} s lies outside [departures], {first:g} to {last:g} s; "
+            "choose a time between",
+        )
+        return self.departures.times()
 
     def _departs(self) -> datetime | None:
         """When gliders leave, by the calendar, where the flow says when t = 0 is."""
@@ -271,6 +329,7 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         cost=blocks["cost"],
         query=from_table(QueryPoints, table["query"], "query") if "query" in table else None,
         text=to_toml(table),
+        departures=from_table(Departures, table["departures"], "departures") if "departures" in table else None,
     )
 
 

@@ -13,7 +13,19 @@ import numpy as np
 from .cache import entry_point, kernel, making
 from .control import CLIMB, DIVE, heading_of, horizontal_speed, vertical_speed
 from .edges import BLOCKED, CONNECTED, NO_HIT, no_edge, store
-from .flight import LANE_LEFT, advance, ends_of, hangar, keep_ends, rest, widen
+from .flight import (
+    LANE_LEFT,
+    LANE_X_HI,
+    LANE_X_LO,
+    LANE_Y_HI,
+    LANE_Y_LO,
+    advance,
+    ends_of,
+    hangar,
+    keep_ends,
+    rest,
+    widen,
+)
 from .flow import velocity
 from .motion import LANE_X, LANE_Y, LANES
 from .patch import longer
@@ -62,22 +74,24 @@ NOBODYS, NOT_ASKED = -1, -2
 """Instead of the number of a leg: nobody has looked for one to this node; nobody may."""
 
 COARSE_STEP = 4.0
-"""Steps of a coarse flight, in steps of a leg: RK4 errs by centimetres there, and nearly the same each time."""
+"""Steps of a coarse flight, in steps of a leg: where it lands is corrected by how far off it was before."""
+COARSE_TOLERANCE = 0.05
+"""A coarse flight that lands so near its target [m], corrected by as little, needs no fine one."""
 NEAR = 0.3
-"""From so near [m] the next step lands on the target: the flight is a fine one."""
+"""From so near [m] the next step lands on the target."""
 MOST_COARSE, MOST_FINE = 7, 4
-GIVE_UP = 3
-"""By this coarse flight a guess that leads anywhere has cut its miss to a quarter."""
+GIVE_UP = 2
+"""By this coarse flight, from 0, a guess that leads anywhere has cut its miss to a quarter."""
 TILT = 1e-3
 """Change of a control [rad] by which the flow map's derivatives are measured."""
-MOST_TRIES = 2
-"""Guesses that are flown for one target."""
-BETTER = 0.9
-"""A neighbour's guess is flown to a target already met if it may arrive in so much of the time, or less."""
+MOST_TRIES = 1
+"""Guesses out of its neighbours that are flown for a target."""
 FURTHEST = 1.0
 """A neighbour's guess that is turned further [rad] is none."""
-BEYOND = 0.05
+BEYOND = 0.02
 """A guess so far [rad] beyond the glide polar's end is flown from its end."""
+SPREADS = 1.02
+"""A neighbour's guess that may arrive later, in times of the slowest edge, is none."""
 HELD = 1.1
 """Legs slower than the slowest edge are followed too, to so many times its time, where edges have a limit."""
 
@@ -89,11 +103,12 @@ _BASE, _TILTED_A, _TILTED_H, _COARSE, _FINE = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @kernel
-def _send(medium, position, source, departure, guess, lanes, n):
-    """Aim lane n by a guess."""
+def _send(medium, position, source, departure, since, guess, lanes, n):
+    """Aim lane n by a guess; where its flow map is not known, first where it was right, `since` [s] before."""
     x, y, z = position[source[int(guess[GUESS_ORIGIN])]]
     x_q, y_q, z_q = position[int(guess[LEG_NODE])]
-    keep_ends(lanes, n, Pair(Place(x, y, z, departure), Place(x_q, y_q, z_q, departure)))
+    t = departure if guess[LEG_KNOWN] else departure - since
+    keep_ends(lanes, n, Pair(Place(x, y, z, t), Place(x_q, y_q, z_q, t)))
     lanes[AIM_DIRECTION, n] = CLIMB if guess[LEG_ANGLE] > 0.0 else DIVE
     lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n] = abs(guess[LEG_ANGLE]), guess[LEG_HEADING]
     for m in range(4):
@@ -125,8 +140,8 @@ def _turned(polar, lanes, n, off_x, off_y):
 
 
 @kernel
-def _measured(polar, lanes, n, off_x, off_y, dt):
-    """Lane n has flown for its flow map's derivatives: on to the next flight; False where it has none."""
+def _measure(polar, lanes, n, off_x, off_y, since, dt):
+    """Lane n has flown for its flow map's derivatives, and for its shift: on to the next flight."""
     mode = lanes[_MODE, n]
     if mode == _BASE:
         lanes[_BASE_X, n], lanes[_BASE_Y, n] = off_x, off_y
@@ -147,38 +162,37 @@ def _measured(polar, lanes, n, off_x, off_y, dt):
         det = x_a * y_h - x_h * y_a
         lanes[AIM_INVERSE, n], lanes[AIM_INVERSE + 1, n] = y_h / det, -x_h / det
         lanes[AIM_INVERSE + 2, n], lanes[AIM_INVERSE + 3, n] = -y_a / det, x_a / det
+        lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = lanes[_BASE_X, n], lanes[_BASE_Y, n]
+        start, goal = ends_of(lanes, n)
+        t = start.t + since
+        keep_ends(lanes, n, Pair(Place(start.x, start.y, start.z, t), Place(goal.x, goal.y, goal.z, t)))
         lanes[_MODE, n] = _COARSE
-        miss = math.hypot(lanes[_BASE_X, n], lanes[_BASE_Y, n])
-        lanes[_FIRST, n], lanes[_COUNT, n] = miss, 1.0
-        if not _turned(polar, lanes, n, lanes[_BASE_X, n], lanes[_BASE_Y, n]):
-            return False
     take_off(polar, lanes, n, COARSE_STEP * dt)
-    return True
 
 
 @kernel
-def _landed(polar, integration, lanes, n):
+def _landed(polar, integration, since, lanes, n):
     """Lane n has landed: on its target, HIT; nowhere near, LOST; else it is turned, and flies again."""
     dt = integration.dt
     _, goal = ends_of(lanes, n)
     off_x, off_y = lanes[LANE_X, n] - goal.x, lanes[LANE_Y, n] - goal.y
     lanes[AIM_STATE, n] = OPEN
     if lanes[_MODE, n] < _COARSE:
-        if not _measured(polar, lanes, n, off_x, off_y, dt):
-            lanes[AIM_STATE, n] = LOST
-            rest(lanes, n)
+        _measure(polar, lanes, n, off_x, off_y, since, dt)
         return
     fine = lanes[_MODE, n] == _FINE
     if not fine:
         off_x, off_y = off_x - lanes[_SHIFT_X, n], off_y - lanes[_SHIFT_Y, n]
     miss = math.hypot(off_x, off_y)
+    shift = math.hypot(lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n])
     count = lanes[_COUNT, n]
+    sure = not fine and max(miss, shift) <= COARSE_TOLERANCE and miss + shift < integration.tolerance
     first_fine = fine and count == 0.0
     if first_fine:
         # the coarse flight with this control would have landed on the target, its shift taken off
         lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = lanes[_SHIFT_X, n] - off_x, lanes[_SHIFT_Y, n] - off_y
-    if fine and miss <= LANDING_TOLERANCE and miss < integration.tolerance:
-        lanes[AIM_MISS, n] = miss
+    if sure or (fine and miss <= LANDING_TOLERANCE and miss < integration.tolerance):
+        lanes[AIM_MISS, n] = miss if fine else miss + shift
         lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
         lanes[AIM_STATE, n] = HIT
         rest(lanes, n)
@@ -194,15 +208,15 @@ def _landed(polar, integration, lanes, n):
         rest(lanes, n)
         return
     lanes[_COUNT, n] += 1.0
-    if not fine and miss <= NEAR:
+    if not fine and miss <= NEAR and shift > COARSE_TOLERANCE:
         lanes[_MODE, n], lanes[_COUNT, n] = _FINE, 0.0
         fine = True
     take_off(polar, lanes, n, dt if fine else COARSE_STEP * dt)
 
 
 @making
-def _fly(medium, position, source, departure, guesses, count, legs, lanes):
-    """Fly all guesses to their ends; what is met, and cheaper than what its leg was, becomes the leg."""
+def _fly(medium, position, source, departure, since, guesses, count, legs, lanes):
+    """Fly all guesses to their ends; what is met becomes the leg."""
     flying = np.zeros(LANES, np.int64)
     horizon = horizon_of(medium)
     following, busy = 0, 0
@@ -210,7 +224,7 @@ def _fly(medium, position, source, departure, guesses, count, legs, lanes):
     for n in range(LANES):
         if following < count:
             flying[n] = following
-            _send(medium, position, source, departure, guesses[following], lanes, n)
+            _send(medium, position, source, departure, since, guesses[following], lanes, n)
             following += 1
             busy += 1
     while busy > 0:
@@ -219,18 +233,14 @@ def _fly(medium, position, source, departure, guesses, count, legs, lanes):
         for n in range(LANES):
             if lanes[LANE_LEFT, n] > 0.0:
                 continue
-            _landed(medium.polar, medium.integration, lanes, n)
-            leg = legs[int(guesses[flying[n], GUESS_SLOT])]
-            latest = LATEST * horizon
-            if leg[LEG_STATUS] == CONNECTED and lanes[_MODE, n] == _FINE:
-                latest = leg[LEG_TIME]
-            if lanes[AIM_STATE, n] == OPEN and lanes[AIM_TIME, n] <= latest:
+            _landed(medium.polar, medium.integration, since, lanes, n)
+            if lanes[AIM_STATE, n] == OPEN and lanes[AIM_TIME, n] <= LATEST * horizon:
                 continue
             if lanes[AIM_STATE, n] == HIT and lanes[AIM_TIME, n] <= horizon:
-                _take(medium, lanes, n, leg)
+                _take(medium, lanes, n, legs[int(guesses[flying[n], GUESS_SLOT])])
             if following < count:
                 flying[n] = following
-                _send(medium, position, source, departure, guesses[following], lanes, n)
+                _send(medium, position, source, departure, since, guesses[following], lanes, n)
                 following += 1
             else:
                 rest(lanes, n)
@@ -239,11 +249,15 @@ def _fly(medium, position, source, departure, guesses, count, legs, lanes):
 
 @kernel
 def _take(medium, lanes, n, leg):
-    """Make the leg of what lane n has found, where that is better."""
-    if leg[LEG_STATUS] == CONNECTED and lanes[AIM_TIME, n] >= leg[LEG_TIME]:
-        return
+    """Make the leg of what lane n has found, where it passes the checks."""
+    if lanes[_MODE, n] == _COARSE:
+        # between its steps it may have been a little further out
+        between = 0.5 * COARSE_STEP * medium.integration.dt
+        between *= medium.flow.extent.max_speed + medium.polar.best_horizontal[int(lanes[AIM_DIRECTION, n])]
+        lanes[LANE_X_LO, n], lanes[LANE_X_HI, n] = lanes[LANE_X_LO, n] - between, lanes[LANE_X_HI, n] + between
+        lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n] = lanes[LANE_Y_LO, n] - between, lanes[LANE_Y_HI, n] + between
     edge = checked_leg(medium, lanes, n)
-    if not (edge.status == CONNECTED or (edge.status == BLOCKED and leg[LEG_STATUS] == NO_HIT)):
+    if edge.status != CONNECTED and edge.status != BLOCKED:
         return
     store(leg[LEG_STATUS:LEG_INVERSE], edge)
     if edge.status == BLOCKED:  # its control is followed all the same: the way may open
@@ -315,7 +329,7 @@ def _slowest_edges(legs, slots, count, nodes, limit, horizon):
 def _neighbours_guesses(
     medium, position, near, source, departure, before, cut, where, legs, slots, count, guesses
 ):  # fmt: skip
-    """Guesses for the nodes near the targets of legs that are new since `before`, the nearest guess of each.
+    """Guesses for the nodes near the targets of legs that were NO_HIT `before`, the nearest guess of each.
 
     Returns (legs, slots, count, guesses, asked): a target that nobody has looked at gets its leg, NO_HIT.
     """
@@ -324,8 +338,7 @@ def _neighbours_guesses(
         slots[k, SLOT_PENDING] = -1
     for k in range(before.size):
         n, direction = slots[k, SLOT_NODE], CLIMB if legs[k, LEG_ANGLE] > 0.0 else DIVE
-        # NaN, of blocked ones, differs from itself
-        new = legs[k, LEG_STATUS] != NO_HIT and legs[k, LEG_TIME] != before[k]
+        new = legs[k, LEG_STATUS] != NO_HIT and before[k] == NO_HIT
         if not new or legs[k, LEG_TIME] > HELD * cut[n, direction]:
             continue
         z_p = position[source[n], 2]
@@ -335,13 +348,12 @@ def _neighbours_guesses(
             slot = where[n, r]
             if (2.0 * direction - 1.0) * (position[r, 2] - z_p) <= 0.0 or slot == NOT_ASKED:
                 continue
-            if slot >= 0 and slots[slot, SLOT_TRIES] >= MOST_TRIES:
+            if slot >= 0 and (slots[slot, SLOT_TRIES] >= MOST_TRIES or legs[slot, LEG_STATUS] != NO_HIT):
                 continue
             guesses = longer(guesses, asked + 1)
             guess = guesses[asked]
             time = _neighbours_guess(medium.polar, position, z_p, legs[k], over_x, over_y, r, guess)
-            met = slot >= 0 and legs[slot, LEG_STATUS] == CONNECTED
-            if not time <= (BETTER * legs[slot, LEG_TIME] if met else LATEST * cut[n, direction]):
+            if not time <= SPREADS * cut[n, direction]:
                 continue
             if slot < 0:
                 slot = count
@@ -403,14 +415,14 @@ def follow_nodes(
             legs[count] = held[first + n, k]
             store(legs[count, LEG_STATUS:LEG_INVERSE], no_edge(NO_HIT))
             legs[count, LEG_ANGLE] = held[first + n, k, LEG_ANGLE]
-            slots[count, SLOT_NODE], slots[count, SLOT_TRIES] = n, 1
+            slots[count, SLOT_NODE] = n
             where[n, int(legs[count, LEG_NODE])] = count
             count += 1
     asked = count
     cut = np.full((last - first, 2), horizon)
     while asked > 0:
-        before = legs[:count, LEG_TIME].copy()
-        _fly(medium, position, source[first:last], departure, guesses, asked, legs, lanes)
+        before = legs[:count, LEG_STATUS].copy()
+        _fly(medium, position, source[first:last], departure, since, guesses, asked, legs, lanes)
         cut = _slowest_edges(legs, slots, count, last - first, limit, horizon)
         legs, slots, count, guesses, asked = _neighbours_guesses(
             medium, position, near, source[first:last], departure, before, cut, where, legs, slots, count, guesses

@@ -80,9 +80,9 @@ def earliest_arrivals(
 ):
     """Dijkstra's algorithm with the clock running: from the nodes whose `arrival` (nodes,) [s] is finite.
 
-    Legs of node n at departures[k] (slices,) [s] are `target`, `time` [indptr[s]:indptr[s + 1]], s = n slices + k,
-    targets rising; linear between. `learnt_first` (nodes + 1,): what was learnt of each node's legs, by target and
-    departure, goes before. Fills `arrival` and `before`, the node of each last leg; ends at the node `goal`, at
+    Legs of node n at departures[k] (slices,) [s] are `target`, `time` [indptr[s]:indptr[s + 1]], for the row
+    s = n slices + k, targets rising; linear between. What was learnt of the legs of each node, from
+    `learnt_first` (nodes + 1,) on by target and departure, goes before. Fills `arrival` and `before`, the node of each last leg; ends at the node `goal`, at
     none where it is -1. Exact where who leaves earlier does not arrive later.
     """
     nodes, slices = arrival.size, departures.size

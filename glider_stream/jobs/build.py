@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
 from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 from ..roadmap.shard import Shard
+from ..roadmap.slices import SlicedRoadmap, rows_of
 from ..roadmap.step_error import with_steps_checked
 from ..roadmap.store import read_part, writing
 from .journal import Journal
@@ -48,7 +49,7 @@ class Job:
     restart: bool = False
     checkpoint: float = CHECKPOINT
     shard: Shard | None = None
-    base: tuple[Roadmap, NDArray[np.bool_]] | None = None
+    base: tuple[Roadmap | SlicedRoadmap, NDArray[np.bool_]] | None = None
     finder: Finder = find_edges
     warm: bool = True
 
@@ -79,19 +80,19 @@ def build_file(
         made = provenance_of(problem, position)
         shard = job.shard or Shard(1, 1)
         identity = {**made.identity(), "shard": str(shard), "nodes": len(position)}
+        rows = len(position) * len(problem.departures)
         journal_path = target.with_name(f"{target.name}.journal")
         kept = ""
         try:
             with (
-                Journal(journal_path, identity, len(position), job.restart, job.checkpoint) as journal,
+                Journal(journal_path, identity, rows, job.restart, job.checkpoint) as journal,
                 threads(thread_count) as used,
             ):
                 try:
                     _run(problem, position, made, path, journal, shard, job, used, progress, batch_pairs)
                 finally:
-                    kept = (
-                        f"{int(journal.done.sum()):,} of {len(position):,} nodes are kept in {journal_path.name}"
-                    )
+                    done = int(journal.done.sum()) * len(position) // rows
+                    kept = f"{done:,} of {len(position):,} nodes are kept in {journal_path.name}"
         except KeyboardInterrupt:
             raise Stopped(f"stopped; {kept}: give the same command again to go on") from None
         except Unwritable as error:
@@ -121,12 +122,14 @@ def _run(
     progress: Callable[[Progress], None],
     batch_pairs: int,
 ) -> None:
+    one = replace(problem, slices=())
     made = with_steps_checked(
-        made, problem, position, lambda some: in_order(list(job.finder(problem, position, some, batch_pairs)))
+        made, one, position, lambda some: in_order(list(job.finder(one, position, some, batch_pairs)))
     )
+    slices = len(problem.departures)
     nodes = np.arange(*shard.nodes(len(position)))
-    tally = Tally(len(nodes), used)
-    old = _taken_over(job, nodes)
+    tally = Tally(len(nodes) * slices, used)
+    old = _taken_over(job, rows_of(nodes, slices), slices)
     if old is not None:
         tally.add(old)
     for edges in journal.records():
@@ -134,29 +137,32 @@ def _run(
     known = journal.done.copy()
     if old is not None:
         known[old.source] = True
-    waiting = nodes[~known[nodes]]
+    waiting = nodes[~known.reshape(-1, slices).all(axis=1)[nodes]]
     if waiting.size:
         if job.warm:
             warm_up(problem)
         for edges in job.finder(problem, position, waiting, batch_pairs):
             journal.append(edges)
             progress(tally.add(edges))
-    with writing(path, position, lonlat_of(problem, position), made, shard) as file:
+    departures = np.array(problem.departures) if slices > 1 else None
+    with writing(path, position, lonlat_of(problem, position), made, shard, departures) as file:
         _write(file.append, old, journal.records())
         file.finish(tally)
     journal.remove()
 
 
-def _taken_over(job: Job, nodes: Index) -> Edges | None:
-    """The edges of the nodes that an older roadmap has right."""
+def _taken_over(job: Job, rows: Index, slices: int) -> Edges | None:
+    """Of some rows of edges, those of the nodes that an older roadmap has right."""
     if job.base is None:
         return None
-    road, right = job.base
-    assert road.node_counts is not None
+    road, nodes = job.base
+    counts = road.row_counts if isinstance(road, SlicedRoadmap) else road.node_counts
+    assert counts is not None
     values = np.stack([getattr(road, name) for name in EDGE_FIELDS], axis=1)
-    every = Edges(np.arange(len(right)), np.diff(road.indptr), road.target, values, road.node_counts)
+    right = np.repeat(nodes, slices)
+    every = Edges(np.arange(len(right)), np.diff(road.indptr), road.target, values, counts)
     mine = np.zeros(len(right), dtype=bool)
-    mine[nodes] = True
+    mine[rows] = True
     return every.of(right & mine)
 
 
@@ -206,8 +212,10 @@ def merge(parts: Sequence[str | Path], output: str | Path) -> None:
         f"the output {output} is one of the parts; name another",
     )
     with locked(target.resolve()):
-        tally = Tally(len(first.position), max(part.threads for _, part in heads))
-        with writing(target, first.position, first.lonlat, first.provenance, Shard(1, 1)) as file:
+        slices = 1 if first.departures is None else first.departures.size
+        tally = Tally(len(first.position) * slices, max(part.threads for _, part in heads))
+        what = first.position, first.lonlat, first.provenance, Shard(1, 1), first.departures
+        with writing(target, *what) as file:
             for _, path in sorted(seen.items()):
                 part = read_part(path)
                 assert part.edges is not None

@@ -166,7 +166,9 @@ def build_slices(
             parts.append(edges)
             progress(tally.add(edges))
     whole = in_order(parts)
-    values: dict[str, Any] = {name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)}
+    values: dict[str, Any] = {
+        name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)
+    }
     return SlicedRoadmap(
         departures=np.array(problem.departures),
         position=position,

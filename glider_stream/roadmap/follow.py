@@ -1,4 +1,4 @@
-"""Slices of a roadmap: the legs of some nodes at many departures, each departure's from those of the one before."""
+"""Slices of a roadmap: the legs of some nodes at many departures, each from those of the one before."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from .pairs import Found, NeighbourLegs, ReachableLegs
 from .problem import Problem
 from .steering import FlowMapMethod
 
-FAN_EVERY = 8
+FAN_EVERY = 12
 """Every so many slices a fan looks for all legs again; between, they are followed."""
 BESIDE, ABOVE = 8, 1
 """Nodes near each, to which its legs lead on: on its depth, and on the next depth above and below."""
@@ -30,7 +30,7 @@ ROOM = 1.25
 
 @dataclass(frozen=True)
 class Held:
-    """Legs of some nodes at one departure, as `kernels.follow` has them: rows (n, room, FOLLOWED_COLUMNS), counts (n,)."""
+    """Legs of some nodes at one departure: rows (n, room, FOLLOWED_COLUMNS) of `kernels.follow`, counts (n,)."""
 
     rows: Array
     counts: Index

@@ -14,6 +14,7 @@ from ..vehicle.polar import glider_sha256
 from ..water.inspect import flow_sha256
 from .problem import Problem
 from .roadmap import Provenance, Roadmap
+from .slices import SlicedRoadmap
 
 
 def lonlat_of(problem: Problem, position: Array) -> Array | None:
@@ -42,7 +43,7 @@ def provenance_of(problem: Problem, position: Array) -> Provenance:
     )
 
 
-def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
+def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
     """InputError unless flow, terrain and glider are those that the roadmap was built with."""
     made = roadmap.provenance
     for name, digest, now in (
