@@ -1,8 +1,8 @@
 """Following: the exact legs of a node at one departure are first guesses of its legs at the next.
 
 A leg changes little from one departure to the next, so its control, moved on as it moved before, lands metres
-from the target; a few coarse flights and one fine one find it again. Each leg that is found is a first guess,
-too, for the nodes near its target that are not reached, or later: so what the current brings into reach is found
+from the target; a few coarse flights find it again, and where these are not good enough a fine one. Each leg that
+is found is a first guess, too, for the nodes near its target: so what the current brings into reach is found
 without a fan.
 """
 
@@ -378,7 +378,7 @@ def _neighbours_guesses(
 
 @making
 def _asked_for(indptr, target, first, last, nodes):
-    """Which leg is to which node, (last - first, nodes): NOBODYS, or NOT_ASKED where `indptr` does not name it."""
+    """Which leg is to which node, (last - first, nodes): NOBODYS, or NOT_ASKED if `indptr` does not name it."""
     where = np.full((last - first, nodes), NOBODYS if indptr.size == 0 else NOT_ASKED, np.int32)
     if indptr.size > 0:
         for n in range(first, last):
@@ -394,8 +394,8 @@ def follow_nodes(
 ):  # fmt: skip
     """The legs from the nodes source[first:last] at a departure [s], by those that they had `since` [s] before.
 
-    `near` (nodes, k): nodes beside each, to which its legs lead on. `held` (n, any, FOLLOWED_COLUMNS), `holds` (n,) legs
-    of each. To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with a `limit`
+    `near` (nodes, k): nodes beside each, to which its legs lead on. `held` (n, any, FOLLOWED_COLUMNS), `holds`
+    (n,) legs of each. To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with a `limit`
     the fastest so many of each direction are LEG_CHOSEN. All pairs that were looked at, by rising node, into rows
     of `found` (n, capacity, FOLLOWED_COLUMNS); a count above the capacity says how much is needed.
     """

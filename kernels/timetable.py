@@ -82,8 +82,9 @@ def earliest_arrivals(
 
     Legs of node n at departures[k] (slices,) [s] are `target`, `time` [indptr[s]:indptr[s + 1]], for the row
     s = n slices + k, targets rising; linear between. What was learnt of the legs of each node, from
-    `learnt_first` (nodes + 1,) on by target and departure, goes before. Fills `arrival` and `before`, the node of each last leg; ends at the node `goal`, at
-    none where it is -1. Exact where who leaves earlier does not arrive later.
+    `learnt_first` (nodes + 1,) on by target and departure, goes before. Fills `arrival` and `before`, the node of
+    each last leg; ends at the node `goal`, at none where it is -1. Exact where who leaves earlier does not arrive
+    later.
     """
     nodes, slices = arrival.size, departures.size
     heap, place = np.empty(nodes, np.int64), np.full(nodes, -1, np.int64)

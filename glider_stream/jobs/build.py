@@ -137,7 +137,8 @@ def _run(
     known = journal.done.copy()
     if old is not None:
         known[old.source] = True
-    waiting = nodes[~known.reshape(-1, slices).all(axis=1)[nodes]]
+    done = known[nodes * slices]  # a node's departures are found together
+    waiting = nodes[~done]
     if waiting.size:
         if job.warm:
             warm_up(problem)

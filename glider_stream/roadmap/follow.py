@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..base.threads import in_parallel
 from ..kernels import follow
 from ..kernels.connect import Pairs
@@ -90,7 +90,12 @@ class Follower:
         before = 0.0
         for number, departure in enumerate(self.problem.departures):
             legs = replace(self.problem, departure=departure).legs(self.position)
-            if held is None or not exact or number % self.fan_every == 0:
+            if (
+                not isinstance(legs, NeighbourLegs | ReachableLegs)
+                or held is None
+                or not exact
+                or number % self.fan_every == 0
+            ):
                 found = legs.of(source)
                 held = _held(found)
             else:
@@ -124,7 +129,7 @@ class Follower:
         return pairs, _packed(rows, going)
 
     def _pairs(
-        self, evaluator: Evaluator, source: Index, departure: float, rows: Array, there: Array, *asked: Index
+        self, evaluator: Evaluator, source: Index, departure: float, rows: Array, there: Bools, *asked: Index
     ) -> Found:
         """All pairs that were looked at; of a neighbour law all that it names."""
         edges = there & (rows[:, :, follow.LEG_CHOSEN] > 0)
@@ -155,7 +160,7 @@ def _held(found: Found) -> Held:
     return _packed(rows, there & (rows[:, :, follow.LEG_STATUS] == Status.CONNECTED))
 
 
-def _packed(rows: Array, kept: Array) -> Held:
+def _packed(rows: Array, kept: Bools) -> Held:
     """Some of the rows of each node, side by side."""
     counts = kept.sum(axis=1).astype(np.int64)
     packed = np.zeros((len(rows), int(counts.max(initial=0)), rows.shape[2]))

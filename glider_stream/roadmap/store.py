@@ -180,12 +180,15 @@ def writing(
 def write_roadmap(roadmap: Roadmap | SlicedRoadmap, path: str | Path) -> None:
     """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
-    several = isinstance(roadmap, SlicedRoadmap)
-    rows, known = len(roadmap.indptr) - 1, roadmap.row_counts if several else roadmap.node_counts
+    known, departures = None, None
+    if isinstance(roadmap, SlicedRoadmap):
+        known, departures = roadmap.row_counts, roadmap.departures
+    else:
+        known = roadmap.node_counts
+    rows = len(roadmap.indptr) - 1
     counts = np.zeros((rows, len(Status)), np.int32) if known is None else known
     by_status = np.array([roadmap.counts[s.name.lower()] for s in Status])
     tally = Tally(rows, roadmap.threads, by_status, roadmap.wall_s)
-    departures = roadmap.departures if several else None
     what = roadmap.position, roadmap.lonlat, roadmap.provenance, Shard(1, 1), departures
     with writing(path, *what) as file:
         file.append(Edges(np.arange(rows), np.diff(roadmap.indptr), roadmap.target, values, counts))

@@ -208,7 +208,7 @@ class _Query:
         return float(road.time[at]) if at < last and road.target[at] == b else math.inf
 
     def _exact(self, start: Array, goal: Array, when: float) -> Array:
-        """The leg between two points that leaves at a time [s], a row of `Edge`; none ends later than the flow."""
+        """The leg between two points that leaves at a time [s], a row of `Edge`; none outlasts the flow."""
         evaluator = self.problem.evaluator
         row: Array = evaluator.connect(np.array([start, goal]), when, [0], [0, 1], [1])[0]
         if row[STATUS] == CONNECTED and when + row[TIME] > evaluator.flow.extent.t_hi:

@@ -1,0 +1,104 @@
+"""Searches over slices against labels expanded at their own times; routes flown from end to end."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.slices import arrival_by_labels, problem, sliced
+from scipy.integrate import solve_ivp
+
+from glider_stream.base.errors import InputError
+from glider_stream.base.threads import threads
+from glider_stream.kernels.flow import velocity
+from glider_stream.search.sliced import SliceSearch
+
+
+@pytest.fixture(scope="module")
+def search():
+    return SliceSearch(sliced(), problem())
+
+
+def arrival(hops, departure):
+    return departure + sum(edge.time for _, _, edge in hops)
+
+
+def flown(flow, hops, when):
+    """Where a glider ends (3,) [m] that flies some legs one after another, each when the last one has ended."""
+    at = np.array(hops[0][0])
+    for _, _, edge in hops:
+        along = edge.speed * math.cos(edge.glide_angle)
+        through = along * math.cos(edge.heading), along * math.sin(edge.heading)
+        sinks = edge.speed * math.sin(edge.glide_angle)
+
+        def rate(t, at, through=through, sinks=sinks):
+            u, v = velocity(flow, *at, t)
+            return [u + through[0], v + through[1], sinks]
+
+        at = solve_ivp(rate, (when, when + edge.time), at, "DOP853", rtol=1e-9, atol=1e-6, max_step=10.0).y[:, -1]
+        when += edge.time
+    return at
+
+
+@pytest.mark.parametrize("departure", [0.0, 370.0, 900.0, 1800.0])
+def test_routes_are_as_fast_as_those_of_labels(search, departure):
+    position = sliced().position
+    start, goal = len(position) - 2, len(position) - 1
+    hops, agreement = search.fastest(position[start], position[goal], departure)
+    truth = arrival_by_labels(problem(), position, start, goal, departure)
+    assert agreement.agreed
+    assert agreement.legs >= len(hops)
+    assert agreement.most < 30.0
+    least = truth - departure
+    assert -0.5 <= arrival(hops, departure) - truth <= 0.01 * least
+    end = flown(problem().evaluator.flow, hops, departure)
+    assert np.linalg.norm(end - position[goal]) < 0.5
+
+
+def test_points_beside_the_nodes_are_attached(search):
+    start, goal = np.array([420.0, 380.0, 0.0]), np.array([1510.0, 640.0, -300.0])
+    hops, agreement = search.fastest(start, goal, 500.0)
+    assert agreement.agreed
+    assert (hops[0][0] == start).all()
+    assert (hops[-1][1] == goal).all()
+    assert np.linalg.norm(flown(problem().evaluator.flow, hops, 500.0) - goal) < 0.5
+    near = goal + np.array([-60.0, 0.0, 300.0])
+    hops, _ = search.fastest(near, goal, 0.0)
+    assert len(hops) == 1
+
+
+def test_threads_do_not_change_a_bit(search):
+    ends = np.array([420.0, 380.0, 0.0]), np.array([1510.0, 640.0, -300.0])
+    found = []
+    for count in (1, 2):
+        with threads(count):
+            found.append(search.fastest(*ends, 333.0))
+    assert str(found[0]) == str(found[1])
+
+
+def test_slices_that_are_wrong_are_found_out():
+    """Times that are off by a fifth, some this way and some that: the route is still one that is flown."""
+    road = sliced()
+    worse = replace(road, time=road.time * np.random.default_rng(0).uniform(0.8, 1.2, road.time.size))
+    position = road.position
+    hops, agreement = SliceSearch(worse, problem()).fastest(position[-2], position[-1], 300.0)
+    assert agreement.agreed
+    assert agreement.most > 5.0
+    assert agreement.rounds > 1
+    assert np.linalg.norm(flown(problem().evaluator.flow, hops, 300.0) - position[-1]) < 0.5
+    assert "differ by" in str(agreement)
+
+
+def test_a_departure_outside_the_slices_is_refused(search):
+    position = sliced().position
+    with pytest.raises(InputError, match="from 0 s to 1800 s; got 1801 s"):
+        search.fastest(position[-2], position[-1], 1801.0)
+
+
+def test_no_way_is_the_honest_no():
+    road = sliced()
+    none = {name: getattr(road, name)[:0] for name in ("time", "cost", "glide_angle", "heading", "speed", "miss")}
+    empty = replace(road, indptr=np.zeros_like(road.indptr), target=road.target[:0], **none)
+    hops, agreement = SliceSearch(empty, problem()).fastest(road.position[-2], road.position[-1], 0.0)
+    assert hops is None
+    assert agreement.agreed
