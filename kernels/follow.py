@@ -395,9 +395,9 @@ def follow_nodes(
     """The legs from the nodes source[first:last] at a departure [s], by those that they had `since` [s] before.
 
     `near` (nodes, k): nodes beside each, to which its legs lead on. `held` (n, any, FOLLOWED_COLUMNS), `holds`
-    (n,) legs of each. To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with a `limit`
-    the fastest so many of each direction are LEG_CHOSEN. All pairs that were looked at, by rising node, into rows
-    of `found` (n, capacity, FOLLOWED_COLUMNS); a count above the capacity says how much is needed.
+    (n,) legs of each. To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with a
+    `limit` the fastest so many of each direction are LEG_CHOSEN. All pairs that were looked at, by rising node,
+    into rows of `found` (n, capacity, FOLLOWED_COLUMNS); a count above the capacity says how much is needed.
     """
     horizon = horizon_of(medium)
     lanes = hangar(FOLLOW_ROWS)

@@ -33,7 +33,7 @@ def keys(road):
 
 
 def arrival_by_labels(problem, position, start, goal, departure):
-    """When the node `goal` is reached from the node `start` [s], each leg found at the time at which it leaves."""
+    """When the node `goal` is reached from the node `start` [s], each leg found at its own departure."""
     best, queue = {start: departure}, [(departure, start)]
     while queue:
         when, node = heapq.heappop(queue)
