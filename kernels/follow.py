@@ -73,31 +73,33 @@ SLOT_NODE, SLOT_TRIES, SLOT_PENDING = range(3)
 NOBODYS, NOT_ASKED = -1, -2
 """Instead of the number of a leg: nobody has looked for one to this node; nobody may."""
 
-COARSE_STEP = 4.0
+COARSE_STEP = 6.0
 """Steps of a coarse flight, in steps of a leg: where it lands is corrected by how far off it was before."""
 COARSE_TOLERANCE = 0.05
 """A coarse flight that lands so near its target [m], corrected by as little, needs no fine one."""
+FORESEEN = 0.02
+"""Nor does a step need a flight after which, as misses shrank so far, no more of one [m] is left."""
 NEAR = 0.3
 """From so near [m] the next step lands on the target."""
 MOST_COARSE, MOST_FINE = 7, 4
-GIVE_UP = 2
+GIVE_UP = 3
 """By this coarse flight, from 0, a guess that leads anywhere has cut its miss to a quarter."""
 TILT = 1e-3
 """Change of a control [rad] by which the flow map's derivatives are measured."""
-MOST_TRIES = 1
+MOST_TRIES = 3
 """Guesses out of its neighbours that are flown for a target."""
 FURTHEST = 1.0
 """A neighbour's guess that is turned further [rad] is none."""
-BEYOND = 0.02
+BEYOND = 0.05
 """A guess so far [rad] beyond the glide polar's end is flown from its end."""
-SPREADS = 1.02
+SPREADS = 1.05
 """A neighbour's guess that may arrive later, in times of the slowest edge, is none."""
 HELD = 1.1
 """Legs slower than the slowest edge are followed too, to so many times its time, where edges have a limit."""
 
-_ROWS = range(AIM_ROWS, AIM_ROWS + 10)
-_MODE, _COUNT, _FIRST, _SHIFT_X, _SHIFT_Y = _ROWS[:5]
-_BASE_X, _BASE_Y, _BY_A_X, _BY_A_Y, _TILT_A = _ROWS[5:]
+_ROWS = range(AIM_ROWS, AIM_ROWS + 11)
+_MODE, _COUNT, _FIRST, _LAST, _SHIFT_X, _SHIFT_Y = _ROWS[:6]
+_BASE_X, _BASE_Y, _BY_A_X, _BY_A_Y, _TILT_A = _ROWS[6:]
 FOLLOW_ROWS = _ROWS.stop
 _BASE, _TILTED_A, _TILTED_H, _COARSE, _FINE = 0.0, 1.0, 2.0, 3.0, 4.0
 
@@ -171,6 +173,15 @@ def _measure(polar, lanes, n, off_x, off_y, since, dt):
 
 
 @kernel
+def _meet(integration, lanes, n, miss):
+    """Lane n has met its target, but for a miss [m]: HIT where that is below the tolerance."""
+    lanes[AIM_MISS, n] = miss
+    lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
+    lanes[AIM_STATE, n] = HIT if miss < integration.tolerance else LOST
+    rest(lanes, n)
+
+
+@kernel
 def _landed(polar, integration, since, lanes, n):
     """Lane n has landed: on its target, HIT; nowhere near, LOST; else it is turned, and flies again."""
     dt = integration.dt
@@ -185,30 +196,38 @@ def _landed(polar, integration, since, lanes, n):
         off_x, off_y = off_x - lanes[_SHIFT_X, n], off_y - lanes[_SHIFT_Y, n]
     miss = math.hypot(off_x, off_y)
     shift = math.hypot(lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n])
+    coarse_is_enough = not fine and shift <= COARSE_TOLERANCE
     count = lanes[_COUNT, n]
-    sure = not fine and max(miss, shift) <= COARSE_TOLERANCE and miss + shift < integration.tolerance
     first_fine = fine and count == 0.0
     if first_fine:
         # the coarse flight with this control would have landed on the target, its shift taken off
         lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = lanes[_SHIFT_X, n] - off_x, lanes[_SHIFT_Y, n] - off_y
-    if sure or (fine and miss <= LANDING_TOLERANCE and miss < integration.tolerance):
-        lanes[AIM_MISS, n] = miss if fine else miss + shift
-        lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
-        lanes[AIM_STATE, n] = HIT
-        rest(lanes, n)
+    if fine and miss <= LANDING_TOLERANCE:
+        _meet(integration, lanes, n, miss)
+        return
+    if coarse_is_enough and miss <= COARSE_TOLERANCE:
+        _meet(integration, lanes, n, miss + shift)
         return
     if count == 0.0:
         lanes[_FIRST, n] = miss
     elif not first_fine:
         broyden(lanes, n, off_x - lanes[AIM_OFF_X, n], off_y - lanes[AIM_OFF_Y, n])
+    left = miss * miss / lanes[_LAST, n] if count > 0.0 else math.inf
+    lanes[_LAST, n] = miss
     astray = not fine and count == GIVE_UP and miss > 0.25 * lanes[_FIRST, n]
     late = count == (MOST_FINE if fine else MOST_COARSE) - 1.0
     if astray or late or not miss < math.inf or not _turned(polar, lanes, n, off_x, off_y):
         lanes[AIM_STATE, n] = LOST
         rest(lanes, n)
         return
+    if coarse_is_enough and left <= FORESEEN:
+        start, goal = ends_of(lanes, n)
+        direction = int(lanes[AIM_DIRECTION, n])
+        lanes[AIM_TIME, n] = abs(goal.z - start.z) / vertical_speed(polar, direction, lanes[AIM_ANGLE, n])
+        _meet(integration, lanes, n, left + shift)
+        return
     lanes[_COUNT, n] += 1.0
-    if not fine and miss <= NEAR and shift > COARSE_TOLERANCE:
+    if not fine and miss <= NEAR and not coarse_is_enough:
         lanes[_MODE, n], lanes[_COUNT, n] = _FINE, 0.0
         fine = True
     take_off(polar, lanes, n, dt if fine else COARSE_STEP * dt)

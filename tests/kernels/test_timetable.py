@@ -16,6 +16,7 @@ def table(seed, nodes=30, slices=4):
     rng = np.random.default_rng(seed)
     departures = np.cumsum(rng.uniform(50, 100, slices))
     present = rng.random((nodes, slices, nodes)) < 0.3
+    present[np.arange(nodes), :, np.arange(nodes)] = False
     slowest = rng.uniform(10, 300, (nodes, 1, nodes))
     times = slowest + rng.uniform(0, 40, (nodes, slices, nodes))
     degree = present.sum(axis=2).ravel()
