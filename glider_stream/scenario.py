@@ -132,6 +132,7 @@ class Scenario:
             glider_words=str(self.glider),
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
             departs=self._departs(),
+            domain=self.domain,
         )
 
     @property

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
 from typing import Any
@@ -22,6 +22,7 @@ from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
 from ..roadmap.step_error import check_steps
 from ..water.frame import true_north
 from .path import Leg, Path
+from .why_not import why_not
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
@@ -89,7 +90,11 @@ class Planner:
         A point that is a node is used as it is; any other is attached by its own neighbours, and the leg
         from end to end is looked at, too. `blend` makes another sum the least.
         """
-        return self.queries(start, [goal], blend)[0]
+        path = self.queries(start, [goal], blend)[0]
+        if path.found:
+            return path
+        reason = why_not(self.problem, *self._reached(path.start), path.start, path.goal)
+        return replace(path, why=str(reason), why_not=reason.as_dict())
 
     def queries(
         self,
@@ -108,6 +113,10 @@ class Planner:
         search = self._search(self._start(start), Blend(0.0, 1.0))
         nodes = len(self.roadmap.position)
         return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
+
+    def _reached(self, start: Array) -> tuple[Array, Array]:
+        """The nodes' places (n, 3) [m], and when each can be reached from a start at the soonest (n,) [s]."""
+        return self.roadmap.position, self.arrivals(start)
 
     def connect(self, start: Array, end: Array) -> Edge:
         """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.

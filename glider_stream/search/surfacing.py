@@ -96,6 +96,10 @@ class SurfacingPlanner(Planner):
         )
         return nodes, place
 
+    def _reached(self, start: Array) -> tuple[Array, Array]:
+        """As Planner; a node is reached in whichever of its states is reached first."""
+        return self.base.position, self.arrivals(start).reshape(-1, len(self.base.position)).min(axis=0)
+
     def _on_base(self) -> Legs:
         return self.problem.legs(self.base.position)
 
