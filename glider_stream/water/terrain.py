@@ -68,6 +68,7 @@ class Raster:
         self.frame, self.low = frame, low
         self.step = max(float((high - low).max()) / SIDE, FINEST)
         self.count = np.ceil((high - low) / self.step).astype(np.int64) + 1
+        self.ground = np.full(tuple(self.count), -np.inf)
         self.bottom = np.full(tuple(self.count), -np.inf)
         self.land = np.zeros(tuple(self.count), dtype=bool)
 
@@ -95,13 +96,17 @@ class Raster:
         first, end = (np.clip(part, 0, last).astype(np.int64) for part in (first, end))
         unknown = ((high < -0.5) | (low > last + 0.5)).any(axis=-1)
         # one window for all cells, as large as the largest needs, about the middle of each
-        size = int((end - first).max()) + 1
-        highest = maximum_filter(bottom.height, size=2 * (size // 2) + 1, mode="nearest")
+        size = 2 * (int((end - first).max() + 1) // 2) + 1
         middle = (first + end) // 2
-        here = highest[middle[..., 1], middle[..., 0]]
-        here = np.where(unknown, LAND, here)  # what a file does not hold, nobody flies over
-        self.bottom = np.maximum(self.bottom, here)
-        self.land |= here >= LAND
+
+        def highest(values: Array) -> Array:
+            here = maximum_filter(values, size=size, mode="nearest")[middle[..., 1], middle[..., 0]]
+            return np.where(unknown, LAND, here)  # what a file does not hold, nobody flies over
+
+        ground = highest(bottom.height if bottom.ground is None else bottom.ground)
+        self.ground = np.maximum(self.ground, ground)
+        self.land |= ground >= LAND
+        self.bottom = np.maximum(self.bottom, ground if bottom.ground is None else highest(bottom.height))
 
     def add_polygons(self, polygons: Sequence[Any]) -> None:
         """No depth is open in a cell that a polygon touches."""
@@ -122,7 +127,7 @@ class Raster:
 
     def seabed(self, clearance: float, max_depth: float | None, land_distance: float) -> Seabed:
         """The bottom as the kernels read it."""
-        closed = self.land | np.isposinf(self.bottom)
+        closed = self.land | (self.bottom >= LAND)
         if land_distance > 0 and self.land.any():
             from scipy.ndimage import distance_transform_edt
 
@@ -130,13 +135,13 @@ class Raster:
             near = distance_transform_edt(~self.land) * self.step - self.step * math.sqrt(0.5) <= land_distance
             closed |= near
         lowest = -np.inf if max_depth is None else -max_depth
-        bottom = np.where(closed, LAND, np.maximum(self.bottom + clearance, lowest))
+        # clearance counts from the seabed, not from where a file's data end
+        bottom = np.where(closed, LAND, np.maximum(np.maximum(self.ground + clearance, self.bottom), lowest))
         ends = self.count - 1.0
         corner = np.array([[[0.0, 0.0], [0.0, ends[1]]], [[ends[0], 0.0], [ends[0], ends[1]]]])
         per_x, per_y = 1 / (self.step * ends)
-        return Seabed(
-            np.ascontiguousarray(bottom), 0.0, corner, float(per_x), float(per_y), *map(float, self.low)
-        )
+        bottom, ground = (np.ascontiguousarray(part) for part in (bottom, self.ground))
+        return Seabed(bottom, 0.0, corner, float(per_x), float(per_y), *map(float, self.low), ground)
 
 
 def read_polygons(file: str | Path, frame: LocalFrame) -> list[Any]:
