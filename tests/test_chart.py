@@ -176,7 +176,8 @@ def test_names_and_steps_of_degrees():
 
 def test_a_profile_shows_the_seabed_where_it_is_near():
     scene = ocean_scene()
-    shallow = scene.terrain._replace(bottom=np.minimum(scene.terrain.bottom, 0.0) * 0.5 - 1.0, clearance=0.0)
+    raised = np.minimum(scene.terrain.ground, 0.0) * 0.5 - 1.0
+    shallow = scene.terrain._replace(bottom=raised, ground=raised, clearance=0.0)
     for terrain, said, ground in ((scene.terrain, "1,4", False), (shallow, "over the seabed", True)):
         figure = plot.plot_chart(scene.flow, terrain, scene.problem, plot.placed(scene.path, scene.problem))
         (ax,) = (ax for ax in figure.findobj(lambda a: hasattr(a, "get_xlabel")) if "(b)" in ax.get_title("left"))

@@ -13,9 +13,13 @@ from .file import Times, parse_time
 from .names import SINCE, Catalogue, Names, standard_name, units_of
 from .units import in_seconds
 
-REFERENCE = re.compile(r"^(forecast_)?(reference_time|reftime)$|^(run|run_time|init|init_time|analysis_time)$", re.I)
+REFERENCE = re.compile(
+    r"^(forecast_)?(reference_time|reftime)$|^(run|run_time|init|init_time|analysis_time)$", re.I
+)
 """Names of the time at which a forecast begins."""
-LEAD = re.compile(r"^(step|lead|lead_time|leadtime|forecast_period|forecast_hour|fhour|tau|prediction_timedelta)$", re.I)
+LEAD = re.compile(
+    r"^(step|lead|lead_time|leadtime|forecast_period|forecast_hour|fhour|tau|prediction_timedelta)$", re.I
+)
 """Names of the time since then."""
 MEAN_TITLES = re.compile(
     r"\b(daily|hourly|monthly|weekly|annual|yearly|time|\d+.?(day|hour|month)\w*)[\s_-]*(mean|average)"
@@ -23,7 +27,18 @@ MEAN_TITLES = re.compile(
     re.I,
 )
 """Titles and products that speak of means over time."""
-TITLES = ("title", "id", "product", "product_id", "dataset", "dataset_id", "type", "field_type", "summary", "source")
+TITLES = (
+    "title",
+    "id",
+    "product",
+    "product_id",
+    "dataset",
+    "dataset_id",
+    "type",
+    "field_type",
+    "summary",
+    "source",
+)
 MEAN_WORDS = ("mean", "average", "averaged", "avg")
 
 
@@ -80,7 +95,9 @@ def _units(variable: Any, said: Names) -> str:
     return f"{alone} since {origin}"
 
 
-def _decoded(at: Catalogue, variable: Any, said: Names, units: str | None = None) -> tuple[Times | None, tuple[str, ...]]:
+def _decoded(
+    at: Catalogue, variable: Any, said: Names, units: str | None = None
+) -> tuple[Times | None, tuple[str, ...]]:
     """UTC, or None for a single time that does not say when; notes."""
     import xarray
 
@@ -90,7 +107,7 @@ def _decoded(at: Catalogue, variable: Any, said: Names, units: str | None = None
         require(
             variable.size == 1,
             f'{broken} has no unit such as "hours since 1950-01-01" (it has {units or "none"!r}), so '
-            f'{variable.size} times are unknown: name `origin` in `names`, the date from which they count',
+            f"{variable.size} times are unknown: name `origin` in `names`, the date from which they count",
         )
         return None, (f"`{variable.name}` does not say when it is",)
     raw = np.atleast_1d(np.asarray(variable.values))
@@ -191,7 +208,9 @@ def _forecast(at: Catalogue, variable: Any) -> Clock | None:
     if valid is not None:
         one = valid.isel({dim: n for dim, n in picked.items() if dim in valid.dims})
         times, notes = _decoded(at, one, at.said)
-        return Clock(times, (lead,), picked, f"{valid.name}{chosen}", "instants: nothing says that they are means", notes)
+        return Clock(
+            times, (lead,), picked, f"{valid.name}{chosen}", "instants: nothing says that they are means", notes
+        )
     starts = [name for name in map(str, at.data.variables) if _is_start(at, name, run)]
     if len(starts) != 1:
         raise InputError(
@@ -205,10 +224,14 @@ def _forecast(at: Catalogue, variable: Any) -> Clock | None:
     period = at.data[lead]
     seconds = in_seconds(units_of(period))
     if seconds is None:
-        raise InputError(f"the lead time `{lead}` in {at.name} is in {units_of(period)!r}, which is no unit of time")
+        raise InputError(
+            f"the lead time `{lead}` in {at.name} is in {units_of(period)!r}, which is no unit of time"
+        )
     after = np.rint(np.asarray(period.values, np.float64) * seconds * 1e3).astype("timedelta64[ms]")
     words = f"{starts[0]} + {lead}{chosen}"
-    return Clock(begin.ravel()[0] + after, (lead,), picked, words, "instants: nothing says that they are means", notes)
+    return Clock(
+        begin.ravel()[0] + after, (lead,), picked, words, "instants: nothing says that they are means", notes
+    )
 
 
 def _is_lead(at: Catalogue, dim: str) -> bool:
@@ -245,7 +268,9 @@ def _chosen_run(at: Catalogue, variable: Any, run: str) -> tuple[dict[str, int],
         return {run: 0}, ""
     said = at.said.run
     known = _decoded(at, at.data[run], at.said)[0] if run in at.data.variables else None
-    listed = "" if known is None else f", {known[0].astype('datetime64[s]')}Z to {known[-1].astype('datetime64[s]')}Z"
+    listed = (
+        "" if known is None else f", {known[0].astype('datetime64[s]')}Z to {known[-1].astype('datetime64[s]')}Z"
+    )
     require(
         said is not None,
         f"{at.name} holds {size} runs of a forecast along `{run}`{listed}: name `run` in `names`, its number from 0 "
@@ -256,7 +281,7 @@ def _chosen_run(at: Catalogue, variable: Any, run: str) -> tuple[dict[str, int],
         which = said
     else:
         when = parse_time(str(said), "`run`")
-        hits = [] if known is None else np.flatnonzero(known == when)
+        hits = np.flatnonzero(known == when) if known is not None else np.zeros(0, np.int64)
         require(len(hits) == 1, f"{at.name} holds no run of {said}{listed}; name another `run`")
         which = int(hits[0])
     told = which if known is None else f"{known[which].astype('datetime64[s]')}Z"

@@ -23,7 +23,7 @@ from .grid import Grid, grid_of
 from .ground import model_depth, places_of
 from .horizontal import halves, horizontal_of, no_axis, signs_of
 from .land import Evidence, clear_marks, mask_of
-from .levels import NO_LEVELS, Levels, check_hold, faces_of, held_above, levels_of
+from .levels import NO_LEVELS, Levels, check_hold, faces_of, levels_of
 from .names import ALONG_GRID, ALONG_WORDS, IN_METRES, TOWARD_EAST, Catalogue, standard_name, units_of
 from .part import Field, Part
 from .quality import Order, bad_by_flags, spread_over
@@ -36,7 +36,9 @@ Domain = tuple[Range, Range, Range]
 CALM = 5.0
 """The most that a file without a unit may hold to pass for m/s."""
 ANGLES = re.compile(r"^(angle|anglet|ang|alpha|angle_dx|angle_rho|grid_angle|rotang)$", re.IGNORECASE)
-ENSEMBLE = re.compile(r"^(n?ens|ensemble(_member)?|ens_member|members?|number|realization|realisation)$", re.IGNORECASE)
+ENSEMBLE = re.compile(
+    r"^(n?ens|ensemble(_member)?|ens_member|members?|number|realization|realisation)$", re.IGNORECASE
+)
 """Names of the dimension along which the members of an ensemble lie."""
 POLAR = 65.0
 """A global model's nominal axes are no places beyond this latitude [degrees]."""
@@ -87,13 +89,16 @@ class Component:
         every = self._points()
         clock, axes, single, notes = self._axes(every.dims)
         levels = levels_of(self.at, self.variable, axes)
-        self._check_used({"lon": every.took["lon"], "lat": every.took["lat"], "depth": levels.name, "time": clock.words})
+        self._check_used(
+            {"lon": every.took["lon"], "lat": every.took["lat"], "depth": levels.name, "time": clock.words}
+        )
         factor, units = self._factor()
         points = every.cut(self.file, domain)
         floor = None
-        if levels.sigma is not None:
+        terrain_following = levels.sigma
+        if terrain_following is not None:
             levels = self._fixed(levels)
-            floor = points.of(self._over(levels.sigma.depth, every))
+            floor = points.of(self._over(terrain_following.depth, every))
         read = self._wanted_levels(levels, domain, whole_depth)
         count = 1 if clock.times is None else clock.times.size
         self._check_room((count, read.stop - read.start, points.rows.size, points.columns.size), room)
@@ -141,16 +146,16 @@ class Component:
             self._check_nominal(lon, lat, at_lat)
             return Points(dims, grid_of(at_lon, at_lat), rows, columns, None, took, ())
         own_lon, own_lat, placeless = places(self.file, lon, lat)
-        require(
-            min(own_lon.shape) > 1, f"`{self.name}` in {self.file} has no longitude and latitude {many}"
-        )
+        require(min(own_lon.shape) > 1, f"`{self.name}` in {self.file} has no longitude and latitude {many}")
         ny, nx = own_lon.shape
         notes: tuple[str, ...] = ()
         if placeless.any():
             notes = (f"{int(placeless.sum())} points of `{lon.name}` have no place of their own: taken as land",)
         return Points(dims, grid_of(own_lon, own_lat), np.arange(ny), np.arange(nx), placeless, took, notes)
 
-    def _axes(self, horizontal: tuple[str, str]) -> "tuple[Clock, dict[str, tuple[str, str]], list[str], _Choice]":
+    def _axes(
+        self, horizontal: tuple[str, str]
+    ) -> "tuple[Clock, dict[str, tuple[str, str]], list[str], _Choice]":
         """Times; dimension and coordinate of depth, faces or sigma; dimensions of one element that are no axis."""
         clock = clock_of(self.at, self.variable, self._own_time(horizontal))
         axes: dict[str, tuple[str, str]] = {}
@@ -190,7 +195,9 @@ class Component:
     def _chosen_member(self, dim: str) -> "_Choice":
         """The member of an ensemble that the user names: by its label where there are labels, else from 0."""
         size, said = self.variable.sizes[dim], self.said.member
-        labels = [str(label) for label in self.at.data[dim].values.ravel()] if dim in self.at.data.variables else []
+        labels = (
+            [str(label) for label in self.at.data[dim].values.ravel()] if dim in self.at.data.variables else []
+        )
         listed = f", {labels[0]} to {labels[-1]}" if labels else f", 0 to {size - 1}"
         require(
             said is not None,
@@ -198,7 +205,10 @@ class Component:
             "name `member` in `names`, such as member=0",
         )
         known = labels or [str(n) for n in range(size)]
-        require(str(said) in known, f"{self.file} holds no member {said!r} along `{dim}`{listed}; name another `member`")
+        require(
+            str(said) in known,
+            f"{self.file} holds no member {said!r} along `{dim}`{listed}; name another `member`",
+        )
         return _Choice({dim: known.index(str(said))}, (f"member {said} of {size} along `{dim}`, as you say",))
 
     def _check_used(self, found: dict[str, str]) -> None:
@@ -270,7 +280,13 @@ class Component:
         )
 
     def _block(
-        self, points: Points, levels: Levels, clock: Clock, picked: dict[str, int], which: slice, floor: Array | None
+        self,
+        points: Points,
+        levels: Levels,
+        clock: Clock,
+        picked: dict[str, int],
+        which: slice,
+        floor: Array | None,
     ) -> tuple[Values, tuple[str, ...]]:
         """Values (nt, nz, ny, nx) as the file has them, NaN where it says that there are none; notes."""
         place, order = self._selection(points, levels, clock, picked, which)
@@ -409,7 +425,7 @@ class Component:
             return values
         one, land = mask
         here = one.isel({dim: at for dim, at in place.items() if dim in one.dims})
-        own = [dim for dim in order if dim in here.dims]
+        own = [dim for dim in order if dim is not None and dim in here.dims]
         if land is None:
             raise InputError(
                 f"the mask `{one.name}` in {self.file} does not say whether land is 0 or 1: name `land` in `names`, "

@@ -9,7 +9,9 @@ PARTS = {
     "tides alone, or without them": re.compile(r"\btid(e|es|al)\b|\b[uv]_?tide\b|\bassuming no tide\b"),
     "an anomaly": re.compile(r"\banomal(y|ies)\b|\bperturbation|\bdeviation from"),
     "the geostrophic part": re.compile(r"\bgeostrophic\b|\b[uv]gos\w*"),
-    "a mean over the depth": re.compile(r"\bbarotropic\b|\bdepth.?(averaged?|mean|integrated)\b|\bvertical(ly)?.(mean|averaged|integrated)"),
+    "a mean over the depth": re.compile(
+        r"\bbarotropic\b|\bdepth.?(averaged?|mean|integrated)\b|\bvertical(ly)?.(mean|averaged|integrated)"
+    ),
     "the baroclinic part": re.compile(r"\bbaroclinic\b"),
     "an average over many years": re.compile(r"\bclimatolog"),
 }
@@ -29,8 +31,10 @@ def doubts_of(variable: Any) -> tuple[str, ...]:
     parts = [what for what, known in PARTS.items() if known.search(text)]
     if not parts:
         return ()
-    return (f"`{variable.name}` ({long or standard_name(variable) or 'by its name'}) is {' and '.join(parts)}, "
-            "and not the whole current",)
+    return (
+        f"`{variable.name}` ({long or standard_name(variable) or 'by its name'}) is {' and '.join(parts)}, "
+        "and not the whole current",
+    )
 
 
 def speed_doubts(variable: Any, fastest: float) -> tuple[str, ...]:

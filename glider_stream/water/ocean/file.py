@@ -41,7 +41,9 @@ class OceanFile:
     @property
     def words(self) -> tuple[str, ...]:
         """What was assumed of bottom, land, levels and times, for a roadmap to keep."""
-        return tuple(f"{key}: {self.took[key]}" for key in ("bottom", "land", "levels", "stamps") if key in self.took)
+        return tuple(
+            f"{key}: {self.took[key]}" for key in ("bottom", "land", "levels", "stamps") if key in self.took
+        )
 
     @property
     def steady(self) -> bool:

@@ -166,7 +166,9 @@ def unbroken_times(times: Times, when: np.datetime64) -> tuple[slice, str]:
     """The run of times without gaps that holds a moment, or comes nearest; words on the gaps."""
     since = (times - times[0]) / np.timedelta64(1, "s")
     breaks = np.flatnonzero(gaps(since))
-    told = " and ".join(f"{times[n].astype('datetime64[s]')}Z to {times[n + 1].astype('datetime64[s]')}Z" for n in breaks)
+    told = " and ".join(
+        f"{times[n].astype('datetime64[s]')}Z to {times[n + 1].astype('datetime64[s]')}Z" for n in breaks
+    )
     run, _ = unbroken(since, float((when - times[0]) / np.timedelta64(1, "s")))
     return run, f"no data from {told}"
 
@@ -203,13 +205,13 @@ def _build(
         u, v = (part[levels] for part in east_north)
         turned = np.stack([u * cos - v * sin, u * sin + v * cos], axis=-1)
         values[n] = filled(turned)[::-1, kept_i, kept_j]
-    here = wet[:, kept_i, kept_j]
+    kept_wet = wet[:, kept_i, kept_j]
     depth_of = file.seabed[cut.rows][:, cut.columns].T[kept_i, kept_j]
     ground = np.where(depth_of > 0, -(depth_of + DEPTH_SLACK), 0.0)
     if file.surface:
-        closed = np.where(here[0], -np.inf, 0.0)
+        closed = np.where(kept_wet[0], -np.inf, 0.0)
     else:
-        closed = closed_below(here, file.depth, file.lower, depth_of)
+        closed = closed_below(kept_wet, file.depth, file.lower, depth_of)
     along, across = kept.grid.cell_sizes()
     flow, seabed = _assemble(
         values,
@@ -241,7 +243,8 @@ def ocean_waters(
 ) -> tuple[OceanGrid, Bottom]:
     """As `ocean_flow`, and the bottom on the file's own grid."""
     flow, seabed, grid = _ocean_flow(file, frame, lon, lat, depth, epoch)
-    return flow, Bottom(grid, seabed.bottom.T, False, f"bottom of the currents by {file.took['bottom']}", seabed.ground.T)
+    # what was taken for the bottom stands among the words on the file
+    return flow, Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own file", seabed.ground.T)
 
 
 def _ocean_flow(

@@ -16,7 +16,8 @@ from .units import in_metres
 
 STANDARD = re.compile(r"^(model_)?sea_floor_depth|depth_below_(geoid|sea_surface|mean_sea_level)|^model_depth")
 SHORT = re.compile(
-    r"^(deptho|h|hh|ht|hu|hv|topog|bathy(metry|_metry|meter)?|model_?depth|bottom_?depth|depth|depth_?c|htot|hbot)$", re.I
+    r"^(deptho|h|hh|ht|hu|hv|topog|bathy(metry|_metry|meter)?|model_?depth|bottom_?depth|depth|depth_?c|htot|hbot)$",
+    re.I,
 )
 """Names of the depth of a model's sea; `mbathy` counts levels and is none."""
 DEEPEST = 12_000.0
@@ -53,7 +54,8 @@ def model_depth(at: Catalogue, grid: Grid, dims: tuple[str, str] | None) -> Fiel
     """
     if at.said.bottom == "none":
         return None
-    names = [at.said.bottom] if at.said.bottom in at.data.variables else _candidates(at)
+    said = at.said.bottom
+    names = [said] if said is not None and said in at.data.variables else _candidates(at)
     own = [name for name in names if dims and set(dims) <= set(map(str, at.data[name].dims))]
     for name in own or names:
         one = at.data[name].squeeze()
@@ -68,7 +70,7 @@ def model_depth(at: Catalogue, grid: Grid, dims: tuple[str, str] | None) -> Fiel
     if at.said.bottom is not None and at.said.bottom in at.data.variables:
         raise InputError(
             f"`{at.said.bottom}` in {at.name} is no depth [m] on a grid of longitude and latitude; name another "
-            f"`bottom`, or \"none\", of: {listing(at.data.variables)}"
+            f'`bottom`, or "none", of: {listing(at.data.variables)}'
         )
     return None
 

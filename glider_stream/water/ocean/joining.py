@@ -236,7 +236,9 @@ def _seabed(
     unlike = (count > 0) & np.isnan(depth)
     notes = []
     if unlike.any():
-        notes.append(f"{int(unlike.sum())} columns have currents but no depth of the model: bottom by their levels")
+        notes.append(
+            f"{int(unlike.sum())} columns have currents but no depth of the model: bottom by their levels"
+        )
     return np.where((count > 0) & np.isfinite(depth), depth, found), notes
 
 

@@ -118,7 +118,7 @@ class Evidence:
         """Whether a patch of zeros holds three by three points."""
         from scipy.ndimage import binary_erosion
 
-        return bool(binary_erosion(self.still, structure=np.ones((3, 3))).any())
+        return bool(binary_erosion(self.still, structure=np.ones((3, 3), dtype=bool)).any())
 
 
 def both_still(one: Evidence, other: Evidence) -> Evidence:
@@ -144,7 +144,7 @@ def _columns_of_land(name: str, still: Bools, evidence: Evidence, said: str | No
             f"{name} holds both missing values and wide patches of exactly 0 m/s ({evidence.patch()} points together), "
             'which may be land or calm water: name `zeros` in `names`, "land" or "calm"'
         )
-    few = "calm water: they lie apart from each other; name `zeros` = \"land\" in `names` if they are land"
+    few = 'calm water: they lie apart from each other; name `zeros` = "land" in `names` if they are land'
     if evidence.patch() <= ALONE or (evidence.levels < 2 and evidence.fills):
         return none, [f"{count} columns of exactly 0 m/s are taken as {few}"]
     return still, [
@@ -154,7 +154,13 @@ def _columns_of_land(name: str, still: Bools, evidence: Evidence, said: str | No
 
 
 def mark_land(
-    name: str, u: Values, v: Values, deeper: tuple[Values, Values] | None, evidence: Evidence, known: Bools | None, said: str | None
+    name: str,
+    u: Values,
+    v: Values,
+    deeper: tuple[Values, Values] | None,
+    evidence: Evidence,
+    known: Bools | None,
+    said: str | None,
 ) -> list[str]:
     """NaN, in place, where land and seabed are written as zeros; notes on what was assumed.
 

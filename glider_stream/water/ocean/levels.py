@@ -14,7 +14,9 @@ from .names import Catalogue
 from .sigma import SigmaLevels, sigma_levels
 from .units import in_metres
 
-FACES = re.compile(r"^(w_dep|dep_w|z_w|z_w_bot|zw|depth_?w|depth_(edges|faces|bnds|interface)|st_edges_ocean|zi)$", re.I)
+FACES = re.compile(
+    r"^(w_dep|dep_w|z_w|z_w_bot|zw|depth_?w|depth_(edges|faces|bnds|interface)|st_edges_ocean|zi)$", re.I
+)
 """Names of the depths between which the levels of a model lie."""
 HELD_ABOVE = 20.0
 """A top level this near the surface [m] stands for the water above it, too; or half a level's spacing."""
@@ -70,9 +72,10 @@ def levels_of(at: Catalogue, variable: Any, axes: dict[str, tuple[str, str]]) ->
         return replace(NO_LEVELS, dim=dim, name=dim, sigma=sigma, words=sigma.words)
     if "faces" in axes:
         return _between_faces(at, *axes["faces"])
-    name = axes["depth"][1] if "depth" in axes else at.scalar(variable, "depth")
-    if name is None:
+    scalar = at.scalar(variable, "depth")
+    if "depth" not in axes and scalar is None:
         return NO_LEVELS
+    name = axes["depth"][1] if "depth" in axes else str(scalar)
     depth, order, factor, words = depths(at.name, at.data[name], at.said)
     lower, bottom = depth, f"the deepest level with data of each column (`{name}`; values are points)"
     bounds = _bounds(at, name, depth, factor, order)
@@ -107,7 +110,9 @@ def _bounds(at: Catalogue, name: str, depth: Array, factor: float, order: Index)
         of = str(at.data[name].attrs.get(key, ""))
         if of not in at.data.variables:
             continue
-        limits = np.abs(np.asarray(at.data[of].values, np.float64)) * (in_metres(str(at.data[of].attrs.get("units", ""))) or 1.0)
+        limits = np.abs(np.asarray(at.data[of].values, np.float64)) * (
+            in_metres(str(at.data[of].attrs.get("units", ""))) or 1.0
+        )
         if not at.data[of].attrs.get("units"):
             limits = limits * factor
         if limits.shape == (depth.size, 2):
@@ -135,9 +140,7 @@ def check_hold(name: str, said: str | None, levels: Levels) -> bool:
 def no_such_levels(name: str, axis: Array, depth: tuple[float, float], top: float) -> InputError | None:
     """Why levels do not hold the depths of a domain [m], if they do not."""
     if depth[1] > axis[-1] + 0.01:
-        cure = (
-            '; name `hold` = "all" in `names` to hold its one level at all depths' if axis.size == 1 else ""
-        )
+        cure = '; name `hold` = "all" in `names` to hold its one level at all depths' if axis.size == 1 else ""
         return InputError(
             f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} is at {axis[-1]:g} m{cure}"
         )

@@ -47,7 +47,9 @@ LONG_NAMES = [
     )
 ]
 SENSE_OF_U = re.compile(r"\b(eastward|zonal|west.east|x.(velocity|component|direction)|u.(velocity|component))\b")
-SENSE_OF_V = re.compile(r"\b(northward|meridional|south.north|y.(velocity|component|direction)|v.(velocity|component))\b")
+SENSE_OF_V = re.compile(
+    r"\b(northward|meridional|south.north|y.(velocity|component|direction)|v.(velocity|component))\b"
+)
 """Long names that say which component a variable is."""
 NO_CURRENT = re.compile(r"\bwind|stress|stokes|flag|\berror|quality|uncertain|\bice\b|\bair\b|\bstd|variance")
 A_PART = re.compile(r"\btid(e|al)|geostrophic|anomal|barotropic|baroclinic|depth.?averag")
@@ -243,8 +245,10 @@ class Catalogue:
         others = [sense for sense, known in (("u", SENSE_OF_U), ("v", SENSE_OF_V)) if known.search(long)]
         if len(others) != 1 or others[0] == component:
             return ()
-        return (f"the long name of `{name}`, {long!r}, speaks of the other component: its {next(iter(senses), 'name')} "
-                "is believed",)
+        return (
+            f"the long name of `{name}`, {long!r}, speaks of the other component: its {next(iter(senses), 'name')} "
+            "is believed",
+        )
 
     def refuse(self) -> InputError:
         """Why a file without currents is none."""

@@ -110,7 +110,9 @@ def _group(path: Path, said: str | None) -> str | None:
         file.visititems(look)
     if said is not None:
         wanted = said.strip("/")
-        require(wanted in (*every, ""), f"{path.name} holds no group `{said}`; it holds: {', '.join(every) or 'none'}")
+        require(
+            wanted in (*every, ""), f"{path.name} holds no group `{said}`; it holds: {', '.join(every) or 'none'}"
+        )
         return wanted or None
     if not grids or "" in grids:
         return None
@@ -141,7 +143,8 @@ def _with_parents(path: Path, data: Any, group: str | None) -> Any:
             missing = {
                 name: variable.load()
                 for name, variable in around.variables.items()
-                if name not in data.variables and all(data.sizes.get(dim, n) == n for dim, n in variable.sizes.items())
+                if name not in data.variables
+                and all(data.sizes.get(dim, n) == n for dim, n in variable.sizes.items())
             }
             data = data.assign(missing)
     return data

@@ -11,7 +11,9 @@ from .names import Catalogue, standard_name
 Values = NDArray[np.float32]
 Order = tuple[str | None, str | None, str, str]
 """Dimensions of time and level, None where a variable has no such, of rows and of columns."""
-FLAGS = re.compile(r"^(q_?c_?flags?|quality_?(flags?|control)|flags?|qc|.*_(qc|quality_flag|qartod))$", re.IGNORECASE)
+FLAGS = re.compile(
+    r"^(q_?c_?flags?|quality_?(flags?|control)|flags?|qc|.*_(qc|quality_flag|qartod))$", re.IGNORECASE
+)
 BAD = re.compile(r"bad|fail|suspect|questionable|missing|invalid|reject|error|erroneous|unusable|\bland\b")
 NOT_BAD = re.compile(r"not_bad|no_error|error_?free")
 

@@ -141,4 +141,6 @@ def _fits(data: Any, other: Any, dim: str, size: int) -> bool:
     one, two = data[dim].values, other[dim].values
     if one.dtype.kind not in "fiu" or two.dtype.kind not in "fiu":
         return True
-    return bool(np.allclose(one, two, rtol=0, atol=1e-3 * max(float(np.abs(np.diff(one)).min(initial=1.0)), 1e-9)))
+    return bool(
+        np.allclose(one, two, rtol=0, atol=1e-3 * max(float(np.abs(np.diff(one)).min(initial=1.0)), 1e-9))
+    )

@@ -162,7 +162,11 @@ def _ends(name: str, variable: Any, s: Array, c: Array) -> tuple[tuple[float, fl
             f"`{variable.name}` in {name} has one terrain-following level, at s = {at[0]:.3g}, amid the water: "
             "nothing says for which depths it holds; cut the file with more levels",
         )
-        return ((-1.0, -1.0), (2 * half - 1, 2 * half - 1)) if at[0] < -0.5 else ((-2 * half, 2 * stretch[0]), (0.0, 0.0))
+        return (
+            ((-1.0, -1.0), (2 * half - 1, 2 * half - 1))
+            if at[0] < -0.5
+            else ((-2 * half, 2 * stretch[0]), (0.0, 0.0))
+        )
     low = at[0] - (at[1] - at[0]) / 2, stretch[0] - (stretch[1] - stretch[0]) / 2
     high = at[-1] + (at[-1] - at[-2]) / 2, stretch[-1] + (stretch[-1] - stretch[-2]) / 2
     near = 0.25 * (at[1] - at[0]), 0.25 * (at[-1] - at[-2])

@@ -13,7 +13,16 @@ def in_metres(units: str) -> float | None:
     return METRES.get(text if len(text) < 3 else text.removesuffix("s"))
 
 
-HOURS = {"s": 1.0, "sec": 1.0, "second": 1.0, "min": 60.0, "minute": 60.0, "h": 3600.0, "hr": 3600.0, "hour": 3600.0}
+HOURS = {
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "min": 60.0,
+    "minute": 60.0,
+    "h": 3600.0,
+    "hr": 3600.0,
+    "hour": 3600.0,
+}
 HOURS |= {"d": 86400.0, "day": 86400.0}
 """Seconds of units of time."""
 SIGNS = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "·": " ", "⋅": " ", "×": " ", "{": "", "}": "", "$": ""})
