@@ -39,7 +39,8 @@ class TerrainSettings:
     """The block [terrain]: what is kept out of, beside what the current file says of its land and bottom.
 
     `bathymetry`: a file of the bottom, `variable`, `positive` and `names` (lon, lat, units, group) where it
-    does not say them itself; `clearance` [m] above any seabed; `max_depth` [m]; `land_distance` [m] to all land; `keep_out`: files of GeoJSON polygons.
+    does not say them itself; `clearance` [m] above any seabed; `max_depth` [m]; `land_distance` [m] to all
+    land; `keep_out`: files of GeoJSON polygons.
     """
 
     bathymetry: str | None = None
@@ -209,7 +210,7 @@ def _the_short_way(name: str, polygon: Any) -> Any:
         lon = at[0, 0] + np.concatenate([[0.0], np.cumsum(np.where(far, step - np.sign(step) * 360, step))])
         require(
             abs(lon[-1] - lon[0]) < 1.0,
-            f"{name} holds a polygon that goes around a pole, from longitude {at[0, 0]:g} on; cut it at a meridian",
+            f"{name} holds a polygon that goes around a pole, from longitude {at[0, 0]:g}; cut it at a meridian",
         )
         rings.append(np.stack([lon, at[:, 1]], axis=-1))
     outer = rings[0][:, 0]

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ class Chart:
 
     variable: str | None = None
     positive: str | None = None
-    names: Names = Names()
+    names: Names = field(default_factory=Names)
 
     def __post_init__(self) -> None:
         known = self.positive in (None, "up", "down")
@@ -75,7 +75,8 @@ def read_bathymetry(
         for key, name in said.variables().items():
             require(
                 name in data.variables,
-                f"{path.name} holds no variable `{name}`, which `{key}` names; it holds: {listing(data.variables)}",
+                f"{path.name} holds no variable `{name}`, which `{key}` names; "
+                f"it holds: {listing(data.variables)}",
             )
         return _read(path.name, data, frame, lon, lat, beyond, asked)
 

@@ -23,7 +23,8 @@ LEAD = re.compile(
 """Names of the time since then."""
 MEAN_TITLES = re.compile(
     r"\b(daily|hourly|monthly|weekly|annual|yearly|time|\d+.?(day|hour|month)\w*)[\s_-]*(mean|average)"
-    r"|\baverages? file|(mean|average)s? (of|over) (one|a|each|\d)|\bP1[DM]-m\b|-m_\d|\bday_mean\b|\b(mean|average)d? fields?",
+    r"|\baverages? file|(mean|average)s? (of|over) (one|a|each|\d)|\bP1[DM]-m\b|-m_\d|\bday_mean\b"
+    r"|\b(mean|average)d? fields?",
     re.I,
 )
 """Titles and products that speak of means over time."""
@@ -273,8 +274,8 @@ def _chosen_run(at: Catalogue, variable: Any, run: str) -> tuple[dict[str, int],
     )
     require(
         said is not None,
-        f"{at.name} holds {size} runs of a forecast along `{run}`{listed}: name `run` in `names`, its number from 0 "
-        "or its date",
+        f"{at.name} holds {size} runs of a forecast along `{run}`{listed}: name `run` in `names`, its number "
+        "from 0 or its date",
     )
     if isinstance(said, int):
         require(0 <= said < size, f"`run` must be a number from 0 to {size - 1} in {at.name}; got {said}")

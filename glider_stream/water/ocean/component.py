@@ -105,7 +105,7 @@ class Component:
 
         picked = dict.fromkeys(single, 0) | notes.picked | clock.picked
         values, more = self._block(points, levels, clock, picked, read, floor)
-        deeper = self._deeper(points, levels, clock, picked, read, values)
+        deeper = self._deeper(points, levels, clock, picked, read)
         masked = self._mask_dims(levels)
         values, marks = clear_marks(self.file, self.name, values, factor)
         if deeper is not None:
@@ -156,7 +156,7 @@ class Component:
     def _axes(
         self, horizontal: tuple[str, str]
     ) -> "tuple[Clock, dict[str, tuple[str, str]], list[str], _Choice]":
-        """Times; dimension and coordinate of depth, faces or sigma; dimensions of one element that are no axis."""
+        """Times; dimension and coordinate of depth, faces or sigma; dimensions of one element; others chosen."""
         clock = clock_of(self.at, self.variable, self._own_time(horizontal))
         axes: dict[str, tuple[str, str]] = {}
         single: list[str] = []
@@ -261,7 +261,8 @@ class Component:
         words = levels.words
         if not levels.sigma.whole:
             words += f": data at {depth[0]:.4g} to {depth[-1]:.4g} m"
-        return replace(levels, depth=depth, lower=depth, top=top, order=np.arange(depth.size), words=words)
+        order, extent = np.arange(depth.size), f"{top:.4g} to {depth[-1]:.6g} m"
+        return replace(levels, depth=depth, lower=depth, top=top, order=order, words=words, extent=extent)
 
     def _wanted_levels(self, levels: Levels, domain: Domain | None, whole_depth: bool) -> slice:
         """The levels that a domain needs, from the uppermost on: what is land is seen there."""
@@ -314,7 +315,7 @@ class Component:
     def _selection(
         self, points: Points, levels: Levels, clock: Clock, picked: dict[str, int], which: slice
     ) -> tuple[dict[str, Any], Order]:
-        """What of the variable is read, and its dimensions of time and depth, if it has such, rows and columns."""
+        """What of the variable is read, and its dimensions of time, depth (None without), rows and columns."""
         place: dict[str, Any] = dict(picked)
         place[points.dims[1]], place[points.dims[0]] = _slice(points.columns), _slice(points.rows)
         order: Order = (clock.dims[0] if clock.dims else None, levels.dim, *points.dims)
@@ -323,7 +324,7 @@ class Component:
         return place, order
 
     def _deeper(
-        self, points: Points, levels: Levels, clock: Clock, picked: dict[str, int], read: slice, values: Values
+        self, points: Points, levels: Levels, clock: Clock, picked: dict[str, int], read: slice
     ) -> Values | None:
         """What lies below the levels that were read: how deep a column is does not depend on the domain.
 
@@ -331,17 +332,13 @@ class Component:
         """
         if levels.sigma is not None or levels.depth is None or read.stop >= levels.count:
             return None
-        ends_in_zeros = bool((np.nan_to_num(values[:, -1], nan=1.0) == 0).all(axis=0).any())
-        found: Values | None = None
-        count = 1 if not clock.dims else self.variable.sizes[clock.dims[0]]
-        for n in range(count if ends_in_zeros else 1):
-            once = {**picked, **({clock.dims[0]: n} if clock.dims else {})}
-            moment = replace(clock, dims=())
-            layer, _ = self._block(points, levels, moment, once, slice(read.stop, levels.count), None)
-            if found is None:
-                found = layer
-            else:
-                found = np.where(np.abs(layer) > np.abs(found), layer, found)
+        first = dict.fromkeys(clock.dims, 0)
+        below, moment = slice(read.stop, levels.count), replace(clock, dims=())
+        found, _ = self._block(points, levels, moment, {**picked, **first}, below, None)
+        later = range(1, self.variable.sizes[clock.dims[0]]) if clock.dims and (found[:, -1] == 0).any() else ()
+        for n in later:
+            layer, _ = self._block(points, levels, moment, {**picked, clock.dims[0]: n}, below, None)
+            found = np.where(np.abs(layer) > np.abs(found), layer, found)
         return found
 
     def _zeros(
@@ -354,7 +351,7 @@ class Component:
         masked: int,
         is_whole: bool,
     ) -> Evidence:
-        """What the file's zeros look like on its uppermost level, at the first time; read where there are some."""
+        """What the file's zeros look like on its uppermost level, at the first time; read where some are."""
         suspect = ((values == 0) | np.isnan(values)).all(axis=(0, 1)) & (values == 0).any(axis=(0, 1))
         top = values[:1, :1]
         if suspect.any() and not is_whole:
@@ -428,8 +425,8 @@ class Component:
         own = [dim for dim in order if dim is not None and dim in here.dims]
         if land is None:
             raise InputError(
-                f"the mask `{one.name}` in {self.file} does not say whether land is 0 or 1: name `land` in `names`, "
-                'or `mask` = "none" to leave it out'
+                f"the mask `{one.name}` in {self.file} does not say whether land is 0 or 1: name `land` in "
+                '`names`, or `mask` = "none" to leave it out'
             )
         numbers = np.asarray(here.transpose(*own).values, np.float64)
         return np.where(spread_over(numbers, own, order) == land, np.float32(np.nan), values)

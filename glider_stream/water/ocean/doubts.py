@@ -45,6 +45,6 @@ def speed_doubts(variable: Any, fastest: float) -> tuple[str, ...]:
     factor = variable.encoding.get("scale_factor", 1.0)
     cause = "is its unit right?"
     if "float" in kind and factor != 1.0:
-        cause = f"its `scale_factor` {float(factor):g} was applied to data that are no packed integers: is it left over?"
+        cause = f"its `scale_factor` {float(factor):g} was applied to data that are no integers: is it left over?"
     rank = "nowhere above" if fastest < SLOW else "as fast as"
     return (f"`{variable.name}` is {rank} {fastest:.2g} m/s: {cause} Name `units` in `names` to correct it",)

@@ -104,7 +104,7 @@ def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
     notes += mismatch
     merged = {key: what for part in (north, east) for key, what in part.took.items()}
     took = {key: merged[key] for key in ("u", "v", *WORDS) if key in merged}
-    took |= _assumed(east, levels, depth, surface, bool((seabed < np.inf).any()), missing, zeros, found)
+    took |= _assumed(east, levels, depth, surface, missing, zeros, found)
     return OceanFile(
         name,
         grid,
@@ -127,7 +127,6 @@ def _assumed(
     levels: Levels,
     depth: Array | None,
     surface: bool,
-    is_known: bool,
     missing: NDArray[np.bool_],
     zeros: Evidence,
     found: list[str],
@@ -138,10 +137,8 @@ def _assumed(
         bottom = f"the model's depth `{field.name}`"
     elif surface:
         bottom = "unknown: the current of one level is held at all depths"
-    elif not is_known:
-        bottom = "unknown: every column has data down to the last level"
     else:
-        bottom = levels.bottom
+        bottom = f"{levels.bottom}; unknown where they go on to the last level"
     ways = []
     if zeros.masked:
         ways.append("a mask of the file")
@@ -152,11 +149,9 @@ def _assumed(
         for note in found
         if "taken as land" in note or "taken as seabed" in note or "are land, as you say" in note
     ]
-    if levels.depth is None:
-        extent = "the surface, held at all depths"
-    else:
-        extent = f"{levels.top:.4g} to {levels.depth[-1]:.6g} m"
-        extent += ", held at all depths" if surface else ""
+    extent = "the surface, held at all depths" if levels.depth is None else levels.extent
+    if surface and levels.depth is not None:
+        extent = f"{levels.depth[0]:g} m, held at all depths, as you say"
     return {
         "bottom": bottom,
         "land": ", ".join(ways) or "none: every point has data",

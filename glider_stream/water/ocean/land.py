@@ -141,8 +141,8 @@ def _columns_of_land(name: str, still: Bools, evidence: Evidence, said: str | No
         return none, [f"{count} columns without any current are open by the mask: taken as calm water"]
     if evidence.levels < 2 and evidence.fills and evidence.wide():
         raise InputError(
-            f"{name} holds both missing values and wide patches of exactly 0 m/s ({evidence.patch()} points together), "
-            'which may be land or calm water: name `zeros` in `names`, "land" or "calm"'
+            f"{name} holds both missing values and wide patches of exactly 0 m/s ({evidence.patch()} points "
+            'together), which may be land or calm water: name `zeros` in `names`, "land" or "calm"'
         )
     few = 'calm water: they lie apart from each other; name `zeros` = "land" in `names` if they are land'
     if evidence.patch() <= ALONE or (evidence.levels < 2 and evidence.fills):
@@ -192,7 +192,7 @@ def mark_land(
         east[:, part] = north[:, part] = np.nan
     if under.any():
         notes.append(
-            f"{int(under.sum())} points with no current at any time, down to the last level, are taken as seabed; "
-            'name `zeros` = "calm" in `names` if they are water'
+            f"{int(under.sum())} points with no current at any time, down to the last level, are taken as "
+            'seabed; name `zeros` = "calm" in `names` if they are water'
         )
     return notes

@@ -28,7 +28,8 @@ class Levels:
 
     `lower` (nz): how deep the value of each holds, the level itself where values are points, the lower face
     where they are of layers. `top`: how shallow the first holds. `order`: the file's levels in this order.
-    `every`: `lower` of all the file's levels. `words` say what was taken for what, `bottom` what the lowest wet level says of it.
+    `every`: `lower` of all the file's levels; `extent`: from where to where they hold. `words` say what was taken for what, `bottom` what the deepest
+    level with data says of the seabed.
     """
 
     depth: Array | None
@@ -41,6 +42,7 @@ class Levels:
     words: str
     bottom: str
     every: Array | None = None
+    extent: str = ""
 
     @property
     def count(self) -> int:
@@ -81,8 +83,9 @@ def levels_of(at: Catalogue, variable: Any, axes: dict[str, tuple[str, str]]) ->
     bounds = _bounds(at, name, depth, factor, order)
     if bounds is not None:
         lower, bottom = bounds[0], f"the lower face of the deepest layer with data (`{bounds[1]}`)"
-    dim = axes["depth"][0] if "depth" in axes else None
-    return Levels(depth, lower, held_above(depth), order, dim, name, None, words, bottom)
+    dim, top = axes["depth"][0] if "depth" in axes else None, held_above(depth)
+    extent = f"{top:.4g} to {depth[-1]:.6g} m"
+    return Levels(depth, lower, top, order, dim, name, None, words, bottom, extent=extent)
 
 
 def _between_faces(at: Catalogue, dim: str, name: str) -> Levels:
@@ -91,11 +94,12 @@ def _between_faces(at: Catalogue, dim: str, name: str) -> Levels:
     turned = order[0] > order[-1]
     every = np.arange(middle.size)[:: -1 if turned else 1]
     bottom = f"the lower face of the deepest layer with data (`{name}`)"
-    return Levels(middle, faces[1:], float(faces[0]), every, dim, name, None, f"midway between {words}", bottom)
+    told, extent = f"midway between {words}", f"{faces[0]:.4g} to {faces[-1]:.6g} m"
+    return Levels(middle, faces[1:], float(faces[0]), every, dim, name, None, told, bottom, extent=extent)
 
 
 def faces_of(at: Catalogue, variable: Any, dim: str) -> str | None:
-    """The variable of the faces between which the levels along a dimension lie, where their depths are not given."""
+    """The variable of the faces between the levels along a dimension, where their depths are not given."""
     for name in map(str, at.data.variables):
         one = at.data[name]
         known = FACES.match(name) or at.kind(name) == "depth"

@@ -239,16 +239,15 @@ class Catalogue:
         told = ", ".join(f"its {what} {words[what]!r} is {way[sense]}" for what, sense in senses.items())
         require(
             len(set(senses.values())) < 2,
-            f"`{name}` in {self.name} contradicts itself: {told}; name `u` and `v` in `names` if you know which is which",
+            f"`{name}` in {self.name} contradicts itself: {told}; name `u` and `v` in `names` if you know "
+            "which is which",
         )
         long = str(variable.attrs.get("long_name", "")).lower().replace("_", " ")
         others = [sense for sense, known in (("u", SENSE_OF_U), ("v", SENSE_OF_V)) if known.search(long)]
         if len(others) != 1 or others[0] == component:
             return ()
-        return (
-            f"the long name of `{name}`, {long!r}, speaks of the other component: its {next(iter(senses), 'name')} "
-            "is believed",
-        )
+        believed = f"its {next(iter(senses), 'name')} is believed"
+        return (f"the long name of `{name}`, {long!r}, speaks of the other component: {believed}",)
 
     def refuse(self) -> InputError:
         """Why a file without currents is none."""

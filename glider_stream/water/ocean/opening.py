@@ -13,7 +13,7 @@ from typing import Any
 
 from ...base.errors import InputError
 from ...base.settings import require
-from ...base.untrusted import check_claim, check_links
+from ...base.untrusted import check_claim, check_links, groups_of
 
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How TIFF files begin."""
@@ -97,38 +97,20 @@ def _of_the_file(error: Exception) -> bool:
 
 def _group(path: Path, said: str | None) -> str | None:
     """The group of a NetCDF-4 file that holds grids: the user's, the root, or the only one that does."""
-    import h5py
-
-    grids: set[str] = set()
-
-    def look(name: str, one: Any) -> None:
-        if isinstance(one, h5py.Dataset) and one.ndim >= 2:
-            grids.add(name.rpartition("/")[0])
-
-    with h5py.File(path, "r") as file:
-        every = [name for name, one in _groups(file)]
-        file.visititems(look)
+    every, grids = groups_of(path)
     if said is not None:
         wanted = said.strip("/")
-        require(
-            wanted in (*every, ""), f"{path.name} holds no group `{said}`; it holds: {', '.join(every) or 'none'}"
-        )
+        known = ", ".join(every) or "none"
+        require(wanted in (*every, ""), f"{path.name} holds no group `{said}`; it holds: {known}")
         return wanted or None
     if not grids or "" in grids:
         return None
     require(
         len(grids) == 1,
-        f"{path.name} holds grids in {len(grids)} groups, {', '.join(sorted(grids)[:6])}: name `group` in `names`",
+        f"{path.name} holds grids in {len(grids)} groups, {', '.join(sorted(grids)[:6])}: name `group` in "
+        "`names`",
     )
     return grids.pop()
-
-
-def _groups(file: Any) -> list[tuple[str, Any]]:
-    import h5py
-
-    found: list[tuple[str, Any]] = []
-    file.visititems(lambda name, one: found.append((name, one)) if isinstance(one, h5py.Group) else None)
-    return found
 
 
 def _with_parents(path: Path, data: Any, group: str | None) -> Any:
@@ -140,6 +122,7 @@ def _with_parents(path: Path, data: Any, group: str | None) -> Any:
         with xarray.open_dataset(
             path, engine="h5netcdf", decode_times=False, cache=False, group=group or None
         ) as around:
+            _check_claims(path, around)
             missing = {
                 name: variable.load()
                 for name, variable in around.variables.items()

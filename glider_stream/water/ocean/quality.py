@@ -78,7 +78,8 @@ def bad_by_flags(
         found = _bad(one, np.asarray(here.transpose(*dims).values, np.float64))
         if found is None:
             notes.append(
-                f"`{name}` beside the currents does not say what its numbers mean (flag_values, flag_meanings): not used"
+                f"`{name}` beside the currents does not say what its numbers mean (flag_values, flag_meanings): "
+                "not used"
             )
             continue
         hit = spread_over(found[0], dims, order) & np.isfinite(values)

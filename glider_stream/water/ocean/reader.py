@@ -112,7 +112,8 @@ def _dated(part: Part, before: list[Part], said: Names) -> Part:
     number = sum(one.component == part.component for one in before)
     require(
         part.times is None and len(part.values) == 1,
-        "`step` is for files of one step each that do not say their time; at least one of these says it: leave it out",
+        "`step` is for files of one step each that do not say their time; at least one of these says it: leave "
+        "it out",
     )
     first = parse_time(str(said.origin), "`origin`")
     after = np.timedelta64(round(number * said.step * 3_600_000), "ms")

@@ -7,11 +7,11 @@ from ...base.arrays import Array, Bools
 DEEPEST = 11_100.0
 """No sea is as deep [m], nor any land as high: whatever lies beyond is no data."""
 CODES = frozenset({999.0, 9999.0, 10_000.0, 99_999.0, 32_767.0, 32_768.0, 8888.0, 7777.0})
-"""Numbers, of either sign, that stand for no data in files; depths and heights, too, where they lie among such."""
+"""Numbers, of either sign, that stand for no data in files; or for depths, where they lie among such."""
 CLIFF = 5000.0
 """No seabed falls as far everywhere from one cell to the next [m]."""
 BESIDE = 3.0
-"""A code is told from a depth where it is so many times further from its neighbours than others are from theirs."""
+"""A code lies so many times further from its neighbours than others do from theirs ..."""
 LEAST = 50.0
 """... and at least this far [m]."""
 FLAT = 0.2

@@ -17,7 +17,7 @@ FINER = 2
 """Levels of fixed depth for each terrain-following one: interpolating twice must not blur."""
 SAME = 1e-6
 THIN = 0.1
-"""A single level this near the surface or the seabed, as a share of the depth, is taken for the outermost layer."""
+"""A single level this near the surface or the seabed, as a share of the depth, is the outermost layer."""
 
 
 @dataclass(frozen=True)
