@@ -23,7 +23,7 @@ LEAD = re.compile(
 """Names of the time since then."""
 MEAN_TITLES = re.compile(
     r"\b(daily|hourly|monthly|weekly|annual|yearly|time|\d+.?(day|hour|month)\w*)[\s_-]*(mean|average)"
-    r"|\baverages? file|(mean|average)s? (of|over) (one|a|each|\d)|\bP1[DM]-m\b|-m_\d|\bday_mean\b"
+    r"|\baverages? file|(mean|average)s? (of|over) (one|a|each|\d)|(?<![A-Za-z])P(1D|1M|T\d+H)-m\b|\bday_mean\b"
     r"|\b(mean|average)d? fields?",
     re.I,
 )

@@ -44,6 +44,10 @@ POLAR = 65.0
 """A global model's nominal axes are no places beyond this latitude [degrees]."""
 
 
+class TooLargeError(InputError):
+    """Currents that take more memory than they may."""
+
+
 @dataclass(frozen=True)
 class Points:
     """Where a component lies: `dims` across and along the rows, and which of the file's `rows` and `columns`.
@@ -273,12 +277,12 @@ class Component:
     def _check_room(self, sizes: tuple[int, int, int, int], room: float) -> None:
         # as the planner holds it, in float64; the other component takes as much again
         need = 8.0 * math.prod(sizes)
-        require(
-            need <= room if self.component == "v" else 2 * need <= room,
-            f"the currents of {self.file} would take {2 * need / 1e9:.1f} GB "
-            f"({' x '.join(map(str, sizes))} points), more than the rest of the limit, {room / 1e9:.1f} GB: "
-            "cut the file or narrow the domain",
-        )
+        if (need if self.component == "v" else 2 * need) > room:
+            raise TooLargeError(
+                f"the currents of {self.file} would take {2 * need / 1e9:.1f} GB "
+                f"({' x '.join(map(str, sizes))} points), more than the rest of the limit, {room / 1e9:.1f} GB: "
+                "cut the file or narrow the domain"
+            )
 
     def _block(
         self,

@@ -10,10 +10,17 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import Array, Bools
 from ...base.checks import Range
+from ...base.errors import InputError
 from ...base.settings import require
 from ..frame import LocalFrame, eastward, wrapped
 
 Index = NDArray[np.intp]
+
+
+class OutsideError(InputError):
+    """A domain that lies partly outside a grid."""
+
+
 
 EARTH = 6_371_000.0
 WIDE = 5.0
@@ -144,11 +151,11 @@ class LonLatGrid:
         for what, axis, bounds, none in (("longitude", lons, lon, no_lon), ("latitude", lats, lat, no_lat)):
             require(bounds[0] <= bounds[1], f"the domain's {what} must rise; got {bounds[0]:g} to {bounds[1]:g}")
             slack = EDGE * np.diff(axis).max() if axis.size > 1 else 0.0
-            require(
-                axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack,
-                f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
-                f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{none}",
-            )
+            if not (axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack):
+                raise OutsideError(
+                    f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
+                    f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{none}"
+                )
         across, within = span(lons, lon, margin), span(lats, lat, margin)
         rows = slice(within.start + run.start, within.stop + run.start)
         return Cut(rows, which[across], LonLatGrid(lons[across], self.lat[rows]))
@@ -255,17 +262,16 @@ class CurvedGrid:
         last = np.array(part.shape[::-1]) - 1.0
         inside = bool((at >= -EDGE).all() and (at <= last + EDGE).all())
         own_lon, own_lat = self.bounds
-        require(
-            inside,
-            f"the domain, longitude {lon[0]:g} to {lon[1]:g} and latitude {lat[0]:g} to {lat[1]:g}, lies partly "
-            f"outside {name} or across its seam; it holds longitude {own_lon[0]:.6g} to {own_lon[1]:.6g}, "
-            f"latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows",
-        )
-        require(
-            bool(self._open(at, (rows.start, across.start)).all()),
-            f"the domain, longitude {lon[0]:g} to {lon[1]:g} and latitude {lat[0]:g} to {lat[1]:g}, lies across "
-            f"a gap between the rows or columns of {name}, where it holds no data",
-        )
+        domain = f"the domain, longitude {lon[0]:g} to {lon[1]:g} and latitude {lat[0]:g} to {lat[1]:g}, lies"
+        if not inside:
+            raise OutsideError(
+                f"{domain} partly outside {name} or across its seam; it holds longitude {own_lon[0]:.6g} to "
+                f"{own_lon[1]:.6g}, latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows"
+            )
+        if not self._open(at, (rows.start, across.start)).all():
+            raise OutsideError(
+                f"{domain} across a gap between the rows or columns of {name}, where it holds no data"
+            )
         return Cut(rows, np.arange(self.shape[1])[across], part)
 
     def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:

@@ -138,7 +138,7 @@ def _assumed(
     elif surface:
         bottom = "unknown: the current of one level is held at all depths"
     else:
-        bottom = f"{levels.bottom}; unknown where they go on to the last level"
+        bottom = f"{levels.bottom}, unknown where they go on to the last level"
     ways = []
     if zeros.masked:
         ways.append("a mask of the file")

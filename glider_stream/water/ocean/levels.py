@@ -28,8 +28,8 @@ class Levels:
 
     `lower` (nz): how deep the value of each holds, the level itself where values are points, the lower face
     where they are of layers. `top`: how shallow the first holds. `order`: the file's levels in this order.
-    `every`: `lower` of all the file's levels; `extent`: from where to where they hold. `words` say what was taken for what, `bottom` what the deepest
-    level with data says of the seabed.
+    `every`: `lower` of all the file's levels; `extent`: from where to where they hold. `words` say what was
+    taken for what, `bottom` what the deepest level with data says of the seabed.
     """
 
     depth: Array | None
@@ -79,7 +79,7 @@ def levels_of(at: Catalogue, variable: Any, axes: dict[str, tuple[str, str]]) ->
         return NO_LEVELS
     name = axes["depth"][1] if "depth" in axes else str(scalar)
     depth, order, factor, words = depths(at.name, at.data[name], at.said)
-    lower, bottom = depth, f"the deepest level with data of each column (`{name}`; values are points)"
+    lower, bottom = depth, f"the deepest level with data of each column (`{name}`, whose values are points)"
     bounds = _bounds(at, name, depth, factor, order)
     if bounds is not None:
         lower, bottom = bounds[0], f"the lower face of the deepest layer with data (`{bounds[1]}`)"
