@@ -38,7 +38,7 @@ def _stands_apart(value: float, first: Array, second: Array, values: Array) -> b
     least = float(np.quantile(jumps, 0.1))
     if abs(value) in CODES and least > max(LEAST, BESIDE * typical):
         return True
-    if least > CLIFF and least > BESIDE * typical:
+    if least > max(CLIFF, BESIDE * typical):
         return True
     equal = float((usual == 0).mean()) if usual.size else 1.0
     here = values == value
@@ -56,13 +56,14 @@ def undeclared(values: Array) -> tuple[Bools, list[float]]:
     beyond = known & (np.abs(values) > DEEPEST)
     found = [float(value) for value in np.unique(values[beyond])[:4]]
     rest = np.where(beyond, np.nan, values)
-    first, second = _pairs(rest)
     held = np.unique(rest[np.isfinite(rest)])
     candidates = [float(value) for value in held if abs(value) in CODES]
-    candidates += [float(value) for value in held[[0, -1]] if held.size > 1 and float(value) not in candidates]
-    gone = beyond.copy()
+    candidates += [float(value) for value in held[[0, -1]] if held.size and float(value) not in candidates]
     for value in candidates:
-        if _stands_apart(value, first, second, rest):
-            gone |= rest == value
+        here = rest == value
+        # most of a chart is sea; a code may be all that a domain holds
+        few = abs(value) in CODES or 2 * int(here.sum()) < int(np.isfinite(rest).sum())
+        if few and _stands_apart(value, *_pairs(rest), rest):
+            rest = np.where(here, np.nan, rest)
             found.append(value)
-    return gone, found
+    return known & np.isnan(rest), found
