@@ -196,7 +196,7 @@ def _landed(polar, integration, since, lanes, n):
         off_x, off_y = off_x - lanes[_SHIFT_X, n], off_y - lanes[_SHIFT_Y, n]
     miss = math.hypot(off_x, off_y)
     shift = math.hypot(lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n])
-    coarse_is_enough = not fine and shift <= COARSE_TOLERANCE
+    coarse_is_enough = not fine and shift <= COARSE_TOLERANCE and integration.tolerance > 2.0 * COARSE_TOLERANCE
     count = lanes[_COUNT, n]
     first_fine = fine and count == 0.0
     if first_fine:

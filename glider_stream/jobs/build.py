@@ -20,7 +20,7 @@ from ..roadmap.provenance import lonlat_of, provenance_of
 from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 from ..roadmap.shard import Shard
 from ..roadmap.slices import SlicedRoadmap, rows_of
-from ..roadmap.step_error import with_steps_checked
+from ..roadmap.step_error import StepSample
 from ..roadmap.store import read_part, writing
 from .journal import Journal
 
@@ -122,18 +122,21 @@ def _run(
     progress: Callable[[Progress], None],
     batch_pairs: int,
 ) -> None:
-    one = replace(problem, slices=())
-    made = with_steps_checked(
-        made, one, position, lambda some: in_order(list(job.finder(one, position, some, batch_pairs)))
-    )
     slices = len(problem.departures)
     nodes = np.arange(*shard.nodes(len(position)))
-    tally = Tally(len(nodes) * slices, used)
+    tally, sample = Tally(len(nodes) * slices, used), StepSample(len(position))
     old = _taken_over(job, rows_of(nodes, slices), slices)
+    # legs of one departure tell how fine the steps are
+    one, of_one = replace(problem, slices=()), slices == 1
     if old is not None:
         tally.add(old)
+        if of_one:
+            sample.take(old)
     for edges in journal.records():
         tally.add(edges)
+        if of_one:
+            sample.take(edges)
+    made = sample.checked(made, one, position, lambda some: job.finder(one, position, some, batch_pairs))
     known = journal.done.copy()
     if old is not None:
         known[old.source] = True

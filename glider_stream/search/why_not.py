@@ -226,7 +226,7 @@ def reach_of(problem: Problem) -> tuple[float, float]:
     """What one glide covers at most within the horizon, across with the fastest current, and of depth [m]."""
     evaluator = problem.evaluator
     polar, horizon = evaluator.polar, evaluator.integration.dt * evaluator.integration.steps
-    across = (float(polar.best_horizontal.max()) + float(evaluator.flow.max_speed)) * horizon
+    across = (float(polar.best_horizontal.max()) + float(evaluator.flow.extent.max_speed)) * horizon
     down = float((polar.speed[:, -1] * np.sin(polar.steepest)).max()) * horizon
     return across, down
 
