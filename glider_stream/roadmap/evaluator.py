@@ -96,10 +96,12 @@ class Evaluator:
         exact = isinstance(self.steering, FlowMapMethod)
         return self if exact else replace(self, steering=FlowMapMethod())
 
-    def reach(self, position: Array, departure: float, source: Index, limit: int) -> tuple[Index, Index, Array]:
+    def reach(
+        self, position: Array, departure: float | Array, source: Index, limit: int
+    ) -> tuple[Index, Index, Array]:
         """The legs from each of the nodes `source` to whatever lies under its fan: (indptr, target, outcomes).
 
-        Only the fastest `limit` of each vertical direction, all where it is 0. Targets rise within a row.
+        `departure` [s], one for all or (sources,). Only the fastest `limit` of each vertical direction, all where it is 0. Targets rise within a row.
         """
         nobody = np.empty(0, np.int64)
         departs = np.full(source.size, departure)
