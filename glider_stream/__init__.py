@@ -8,22 +8,61 @@ planner.plot(roadmap, path, "route.png")
 """
 
 import importlib
-from typing import Any
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .base.errors import InputError
+    from .kernels.edges import Status
+    from .roadmap.builder import build_roadmap
+    from .roadmap.problem import Problem
+    from .roadmap.roadmap import Roadmap
+    from .roadmap.store import read_roadmap, write_roadmap
+    from .scenario import Scenario, read_scenario, shipped_scenarios
+    from .search.path import Leg, Path
+    from .search.query import Planner
+    from .search.surfacing import Surfacing
+
+    __version__: str
+
+__all__ = [
+    "InputError",
+    "Leg",
+    "Path",
+    "Planner",
+    "Problem",
+    "Roadmap",
+    "Scenario",
+    "Status",
+    "Surfacing",
+    "__version__",
+    "build_roadmap",
+    "read_roadmap",
+    "read_scenario",
+    "shipped_scenarios",
+    "write_roadmap",
+]
 
 _HOMES = {
-    "errors": ("InputError",),
-    "path": ("Path",),
-    "query": ("Planner",),
-    "roadmap": ("Roadmap", "build_roadmap"),
+    "base.errors": ("InputError",),
+    "kernels.edges": ("Status",),
+    "roadmap.builder": ("build_roadmap",),
+    "roadmap.problem": ("Problem",),
+    "roadmap.roadmap": ("Roadmap",),
+    "roadmap.store": ("read_roadmap", "write_roadmap"),
     "scenario": ("Scenario", "read_scenario", "shipped_scenarios"),
-    "store": ("read_roadmap", "write_roadmap"),
+    "search.path": ("Leg", "Path"),
+    "search.query": ("Planner",),
+    "search.surfacing": ("Surfacing",),
 }
+"""Where each name lives. It is loaded when it is first asked for: a start costs only what is used."""
 _WHERE = {name: home for home, names in _HOMES.items() for name in names}
-__all__ = sorted(_WHERE)
 
+if not TYPE_CHECKING:  # a type checker reads the imports above, and would take this for "any name, of any type"
 
-def __getattr__(name: str) -> Any:
-    """Load what is asked for, when it is asked for: starting up costs only what is used."""
-    if name not in _WHERE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f".{_WHERE[name]}", __name__), name)
+    def __getattr__(name):
+        if name == "__version__":
+            return version("glider-stream")
+        if name not in _WHERE:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(f".{_WHERE[name]}", __name__), name)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from small import SCENARIO, command, executable, roadmap, scenario_file
+from helpers.small import SCENARIO, command, executable, roadmap, scenario_file
 
 from glider_stream.roadmap.store import write_roadmap
 

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from types import SimpleNamespace
 
 import pytest
-from small import command, executable, roadmap, scenario_file, strict_json
+from helpers.small import command, executable, roadmap, scenario_file, strict_json
 
 from glider_stream.base import progress
 from glider_stream.cli import cli

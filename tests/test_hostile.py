@@ -14,10 +14,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from helpers.builds import interrupt, problem
+from helpers.small import SCENARIO, roadmap, scenario_file
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
-from small import SCENARIO, roadmap, scenario_file
-from test_jobs import interrupt, problem
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped

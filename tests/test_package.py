@@ -13,7 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from small import command
+from helpers.small import command
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from small import command, roadmap, scenario_file
+from helpers.small import command, roadmap, scenario_file
 
 import glider_stream
 from glider_stream import planner
@@ -107,7 +107,7 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", glider_stream.__all__)
 def test_the_package_has_what_it_names(name):
-    assert getattr(glider_stream, name).__name__ == name
+    assert name == "__version__" or getattr(glider_stream, name).__name__ == name
 
 
 def test_the_package_has_nothing_else():

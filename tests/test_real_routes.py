@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_ocean import IONIAN, WASHINGTON, real
+from helpers.files import IONIAN, WASHINGTON, real
 
 from glider_stream import planner
 from glider_stream.pilot.export import export_path

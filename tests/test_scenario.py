@@ -4,7 +4,7 @@ import math
 import tomllib
 
 import pytest
-from small import SCENARIO, scenario_file
+from helpers.small import SCENARIO, scenario_file
 
 from glider_stream.base.errors import InputError
 from glider_stream.base.toml import to_toml

@@ -1,0 +1,77 @@
+"""Benchmarks: figures of all parts, records that can be compared, refusals."""
+
+import json
+import sys
+
+import pytest
+from helpers.small import command, strict_json
+
+from glider_stream import planner
+from glider_stream.base.errors import InputError
+from glider_stream.evaluation import bench
+from glider_stream.evaluation.bench import Figure, Record, read_record
+
+CEILING = "#!{}\nprint('{{\"evaluations_per_s\": 5e7}}')\n"
+
+
+def record(**medians):
+    """A record of figures that spread by a tenth."""
+    figures = (
+        Figure(name, "1/s", (0.9 * value, value, 1.1 * value), name != "seconds")
+        for name, value in medians.items()
+    )
+    return Record(tuple(figures), {"date": "now"})
+
+
+def test_all_parts_give_figures(tmp_path, capsys):
+    ceiling = tmp_path / "ceiling"
+    ceiling.write_text(CEILING.format(sys.executable))
+    ceiling.chmod(0o755)
+    file = tmp_path / "bench.json"
+    said = command(capsys, "bench", "--quick", "--runs", 1, "--ceiling", ceiling, "--json", file)
+    assert said.code == 0
+    read = strict_json(file.read_text())
+    figures = {one["name"]: one for one in read["figures"]}
+    assert read["quick"] is True
+    assert read["evaluations_per_s"] == figures["evaluations_per_s"]["median"] > 1e6
+    assert figures["share of the ceiling"]["median"] == pytest.approx(read["evaluations_per_s"] / 5e7)
+    assert set(bench.METHODS) <= set(figures)
+    for part in ("all threads over one: flow map, all", "400 nodes: most memory", "start: --help"):
+        assert figures[part]["median"] > 0
+    assert figures["400 nodes: edges"]["median"] > 10_000
+    for name in figures:
+        assert said.out.count(f"  {name} ") == 1
+        assert said.err.count(f"bench: {name} ") == 1
+    again = command(capsys, "bench", "--quick", "--only", "integrator", "--runs", 2, "--against", file)
+    assert again.code == 0
+    assert "moved beyond both spreads:\n" in again.out
+
+
+def test_what_has_moved():
+    before = json.loads(json.dumps(record(edges=100.0, pairs=100.0, seconds=1.0, gone=1.0).as_dict()))
+    now = record(edges=115.0, pairs=150.0, seconds=2.0, new=1.0)
+    assert now.moved(before) == [
+        "pairs: 1.50 times 100 1/s, better",
+        "seconds: 2.00 times 1 1/s, worse",
+    ]
+    assert record(edges=100.0).moved(before) == []
+
+
+@pytest.mark.parametrize("text", ["no JSON", "[]", "{}", '{"figures": [{"name": 1}]}', '{"figures": 3}'])
+def test_a_record_that_is_none(tmp_path, text):
+    (tmp_path / "old.json").write_text(text)
+    with pytest.raises(InputError, match=r"old.json cannot be read: .*; write it with `bench --json`"):
+        read_record(tmp_path / "old.json")
+
+
+def test_refusals_come_before_the_work(tmp_path):
+    refused = [
+        ({"runs": 0}, "`runs` must be at least 1; got 0"),
+        ({"only": ["speed"]}, "the part 'speed' is not known; choose from: integrator"),
+        ({"output": tmp_path / "none/a.json"}, "none does not exist"),
+        ({"against": tmp_path / "none.json"}, "none.json cannot be read: no such file"),
+        ({"only": ["integrator"], "runs": 1, "ceiling": tmp_path / "none"}, "must be a program that prints JSON"),
+    ]
+    for options, words in refused:
+        with pytest.raises(InputError, match=words):
+            planner.bench(options.pop("output", None), **options)

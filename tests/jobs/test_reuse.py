@@ -1,0 +1,149 @@
+"""A new forecast for the same nodes: what is taken over, and that the result is that of a fresh build."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.builds import datasets
+from helpers.small import command, scenario_file
+
+from glider_stream import planner
+from glider_stream.base.errors import InputError
+from glider_stream.jobs.reuse import untouched
+from glider_stream.scenario import read_scenario
+
+xr = pytest.importorskip("xarray")
+
+SCENARIO = """\
+[flow]
+kind = "netcdf"
+file = "a.nc"
+
+[glider]
+preset = "slocum"
+
+[domain]
+lon = [10.2, 10.6]
+lat = [40.2, 40.5]
+depth = [0.0, 900.0]
+
+[sampling]
+kind = "halton"
+count = 500
+seed = 1
+
+[neighbours]
+kind = "nearest"
+k = 12
+
+[steering]
+method = "flow-map"
+
+[integration]
+dt = 60.0
+steps = 120
+tolerance = 150.0
+
+[cost]
+kind = "time"
+"""
+LAWS = {
+    "flow map": [],
+    "refined": ["steering.method=streamline", "steering.candidates=16", "steering.refine=true"],
+    "surface": ["steering.method=surface", "steering.candidates=16"],
+    "reachable": ["neighbours.kind=reachable"],
+    "radius": ["neighbours.kind=radius", "neighbours.radius=1500.0"],
+}
+
+
+def write(name, change=None, dry=None):
+    lon, lat = np.arange(10.0, 10.81, 0.01), np.arange(40.0, 40.71, 0.01)
+    depth = np.array([0.0, 100.0, 300.0, 1000.0])
+    z, y, x = np.meshgrid(depth, lat, lon, indexing="ij")
+    u = 0.25 * np.sin(9 * x) * np.cos(7 * y) * np.exp(-z / 400)
+    v = 0.2 * np.cos(8 * x + 5 * y) * np.exp(-z / 300)
+    if change is not None:
+        inside = (x < 10.29) & (y < 40.28) if change < 1 else (x > 10.5) & (y > 40.42)
+        u, v = np.where(inside, change * u, u), np.where(inside, change * v, v)
+    if dry is not None:
+        u = np.where((x > 10.5) & (y > 40.42) & (z > dry), np.nan, u)
+    dims = ("depth", "lat", "lon")
+    data = xr.Dataset(
+        {"uo": (dims, u, {"units": "m/s"}), "vo": (dims, v, {"units": "m/s"})},
+        {
+            "depth": ("depth", depth, {"units": "m", "positive": "down"}),
+            "lat": ("lat", lat, {"units": "degrees_north"}),
+            "lon": ("lon", lon, {"units": "degrees_east"}),
+        },
+    )
+    data.to_netcdf(name, engine="h5netcdf")
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(SCENARIO)
+    write("a.nc")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("law", "change"),
+    [
+        ("flow map", 0.5),
+        ("refined", 0.5),
+        ("surface", 0.5),
+        ("reachable", 1.6),
+        ("radius", 0.5),
+        ("flow map", 1.6),
+    ],
+)
+def test_a_tenth_of_the_current_changes(place, law, change):
+    """A change that leaves the fastest current as it is, and one that does not."""
+    planner.build("a.toml", "old.h5", overrides=LAWS[law])
+    write("b.nc", change)
+    sets = [*LAWS[law], "flow.file=b.nc"]
+    planner.build("a.toml", "fresh.h5", overrides=sets)
+    before, now = (read_scenario("a.toml", some).problem() for some in (LAWS[law], sets))
+    kept = untouched(planner.info("old.h5"), before, now)
+    assert (0.67 if change < 1 else 0.3) < kept.mean() < 0.95
+    planner.build("a.toml", "new.h5", overrides=sets, base="old.h5")
+    assert datasets("new.h5") == datasets("fresh.h5")
+    assert planner.info("new.h5").target.size > (0 if law == "surface" else 100)
+    assert datasets("new.h5")[0] != datasets("old.h5")[0] or law == "surface"
+
+
+def test_a_seabed_that_rises(place):
+    planner.build("a.toml", "old.h5", overrides=["sampling.count=200"])
+    write("b.nc", dry=250.0)
+    sets = ["sampling.count=200", "flow.file=b.nc"]
+    with pytest.raises(InputError, match="other nodes, and not only another flow"):
+        planner.build("a.toml", "new.h5", overrides=sets, base="old.h5")
+
+
+def test_nothing_has_changed(place):
+    road = planner.build("a.toml", "old.h5")
+    problem = read_scenario("a.toml").problem()
+    assert untouched(road, problem, problem).all()
+
+
+def test_what_cannot_be_taken_over(capsys, place):
+    scenario_file(place)
+    command(capsys, "build", "small.toml", "-o", "small.h5")
+    command(capsys, "build", "a.toml", "-o", "old.h5")
+    for sets, words in {
+        "glider.preset=seaglider": "has other glider",
+        "integration.steps=121": "has other integration",
+        "neighbours.k=13": "has other neighbours",
+        "steering.generations=2": "has other steering",
+        "sampling.count=99": "has other nodes",
+    }.items():
+        said = command(capsys, "build", "a.toml", "-o", "new.h5", "--from", "old.h5", "--set", sets)
+        assert (said.code, words in said.err) == (2, True), said.err
+    said = command(capsys, "build", "a.toml", "-o", "new.h5", "--from", "small.h5")
+    assert (said.code, "build afresh" in said.err) == (2, True)
+    # an analytic flow reaches everywhere
+    sets = ("--set", "flow.sampled=[40.0,40.0,50.0]")
+    assert command(capsys, "build", "small.toml", "-o", "new.h5", "--from", "small.h5", *sets).code == 0
+    command(capsys, "build", "small.toml", "-o", "fresh.h5", *sets)
+    assert datasets("new.h5") == datasets("fresh.h5")
