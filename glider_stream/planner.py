@@ -1,6 +1,5 @@
 """The planner: one call for each command."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os.path import realpath
@@ -27,12 +26,11 @@ from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
+from .search.choice import AnyPlanner, planner_of
 from .search.path import SURFACE, Path, load_path
-from .search.query import Planner
-from .search.surfacing import Surfacing, SurfacingPlanner
+from .search.surfacing import Surfacing
 from .search.thin import thin as thinned
 from .search.trade_off import TradeOff
-from .search.trade_off import trade_off as find_trade_off
 from .water.domain import GeographicDomain, Point
 
 if TYPE_CHECKING:
@@ -165,14 +163,8 @@ def query(
         path = search.query(*ends)
     else:
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
-        front = _front(search, ends)
-        last = front.paths[-1]
-        why = (
-            f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}" if last.found else ""
-        )
-        within = front.within(most_energy)
-        least = front.least_time(most_energy)
-        path = replace(within, least_time=least) if within else replace(last, cost=math.inf, legs=(), why=why)
+        _check_energy(search)
+        path = search.within(*ends, most_energy)
     if thin is not None:
         path = _with_fewer_legs(path, thin, search, most_energy)
     for output in outputs:
@@ -180,9 +172,9 @@ def query(
     return path
 
 
-def _with_fewer_legs(path: Path, tolerance: float, search: Planner, most_energy: float | None) -> Path:
+def _with_fewer_legs(path: Path, tolerance: float, search: AnyPlanner, most_energy: float | None) -> Path:
     """A path thinned, or as it is where fewer legs would break what else was asked for."""
-    rule = search.rule if isinstance(search, SurfacingPlanner) else Surfacing()
+    rule = search.rule
     bound = rule != Surfacing()
     stays = (lambda stop: bool(stop[2] >= -SURFACE)) if bound else (lambda stop: False)
     fewer = thinned(path, tolerance, search.connect, search.fly, stays)
@@ -191,14 +183,15 @@ def _with_fewer_legs(path: Path, tolerance: float, search: Planner, most_energy:
 
 
 def trade_off(roadmap: str | File | Roadmap, start: Point | None = None, goal: Point | None = None) -> TradeOff:
-    """The paths of one query that are best for some price of time against energy; points as in `query`."""
-    return _front(*_search(roadmap, start, goal))
+    """Every path of one query that no other beats both in time and in energy; points as in `query`."""
+    search, ends = _search(roadmap, start, goal)
+    _check_energy(search)
+    return search.front(*ends)
 
 
-def _front(search: Planner, ends: tuple[Array | None, Array | None]) -> TradeOff:
+def _check_energy(search: AnyPlanner) -> None:
     unit = search.problem.evaluator.cost.unit
     require(unit == "J", 'the roadmap\'s cost is time, without energy; build it with [cost] kind = "energy"')
-    return find_trade_off(lambda blend: search.query(*ends, blend=blend))
 
 
 def card(roadmap: str | File | Roadmap, path: Path) -> Card:
@@ -212,28 +205,26 @@ def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
     drawn = read_drawn(route)
     # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
     search, _ = _search(roadmap, None, None, Surfacing())
-    domain = scenario_from_text(search.roadmap.provenance.scenario).domain
+    domain = scenario_from_text(search.problem.scenario).domain
     on_globe = isinstance(domain, GeographicDomain)
     cure = "and the roadmap is in metres; give x, y, z in a CSV file"
     require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
     points = [domain.point(place) if drawn.geographic else np.array(place) for place in drawn.places]
     for n, point in enumerate(points, 1):
         search.problem.check_point(point, f"point {n}")
-    return score_of(points, search.connect, search.query, search.fly)
+    query = lambda start, end, since: search.leaving(since).query(start, end)  # noqa: E731
+    return score_of(points, search.connect, query, search.fly)
 
 
 def _search(
     roadmap: str | File | Roadmap, start: Point | None, goal: Point | None, rule: Surfacing | None = None
-) -> tuple[Planner, tuple[Array | None, Array | None]]:
+) -> tuple[AnyPlanner, tuple[Array | None, Array | None]]:
     road = info(roadmap)
     scenario = scenario_from_text(road.provenance.scenario)
     ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
     if rule is None and scenario.query is not None:
         rule = Surfacing(scenario.query.most_yos, scenario.query.most_hours)
-    problem = scenario.problem()
-    free = rule is None or rule == Surfacing()
-    search = Planner(road, problem) if free or rule is None else SurfacingPlanner(road, problem, rule)
-    return search, (ends[0], ends[1])
+    return planner_of(scenario.problem(), road, rule or Surfacing()), (ends[0], ends[1])
 
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":
@@ -251,7 +242,7 @@ def table(roadmap: str | File | Roadmap, starts: Sequence[Point], goals: Sequenc
     road = info(roadmap)
     scenario = scenario_from_text(road.provenance.scenario)
     ends = ([scenario.domain.point(end) for end in some] for some in (starts, goals))
-    return Planner(road, scenario.problem()).table(*ends)
+    return planner_of(scenario.problem(), road, Surfacing()).table(*ends)
 
 
 def plot(
@@ -305,7 +296,7 @@ def plot(
         if chart:
             route, every = placed(route, problem), None
             if fronts is not None:
-                arrival = Planner(road, problem).arrivals(route.start)
+                arrival = planner_of(problem, road, Surfacing()).arrivals(route.start)
                 every = (fronts_of(road.position, arrival, terrain), fronts)
             if as_page:
                 assert output is not None

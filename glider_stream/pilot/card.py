@@ -131,8 +131,7 @@ def _distance(a: Any, b: Any) -> float:
 
 def _row(leg: Leg, path: Path, problem: Problem, best: float) -> Row:
     rows = leg.trajectory
-    # a leg is planned, and traced, in the water of the roadmap's departure
-    times = problem.departure + rows[:, 0] - rows[0, 0]
+    times = path.water_times(leg, problem.departure)
     current = velocities(problem.evaluator.flow, *(np.ascontiguousarray(rows[:, n]) for n in (1, 2, 3)), times)
     way = rows[-1, 1:3] - rows[0, 1:3]
     far = float(np.hypot(*way))

@@ -94,27 +94,30 @@ class Score:
 
 def score(
     points: Sequence[Array],
-    connect: Callable[[Array, Array], Edge],
-    query: Callable[[Array, Array], Path],
+    connect: Callable[[Array, Array, float], Edge],
+    query: Callable[[Array, Array, float], Path],
     fly: Callable[[list[Hop]], Path],
 ) -> Score:
     """Fly a drawn route: one glide between points at other depths, the best way of the roadmap between others.
 
-    `points` (3,) [m]. As in a query every glide is that of the roadmap's departure, whenever it begins.
+    `points` (3,) [m]. As in a query every glide begins when the last one ends: `connect` and `query` take the
+    seconds since departure.
     """
     legs: list[ScoredLeg] = []
     hops: list[Hop] = []
+    clock = 0.0
     for start, end in pairwise(points):
         if start[2] != end[2]:
-            edge = connect(start, end)
+            edge = connect(start, end, clock)
             status = Status(int(edge.status))
             new = [(start, end, edge)] if status == Status.CONNECTED else []
             found = bool(new)
         else:
-            way, status = query(start, end), Status.SAME_DEPTH
+            way, status = query(start, end, clock), Status.SAME_DEPTH
             new, found = hops_of(way), way.found
         legs.append(ScoredLeg(start, end, status, sum(hop[2].time for hop in new) if found else None, len(new)))
         if not found:
             break
         hops += new
+        clock += sum(hop[2].time for hop in new)
     return Score(tuple(legs), len(points) - 1, fly(hops) if hops else None)

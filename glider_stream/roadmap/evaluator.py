@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import in_parallel
 from ..kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
@@ -97,15 +97,24 @@ class Evaluator:
         return self if exact else replace(self, steering=FlowMapMethod())
 
     def reach(
-        self, position: Array, departure: float | Array, source: Index, limit: int
+        self,
+        position: Array,
+        departure: float | Array,
+        source: Index,
+        limit: int,
+        wanted: Bools | None = None,
     ) -> tuple[Index, Index, Array]:
         """The legs from each of the nodes `source` to whatever lies under its fan: (indptr, target, outcomes).
 
-        `departure` [s], one for all or (sources,). Only the fastest `limit` of each vertical direction, all where it is 0. Targets rise within a row.
+        `departure` [s], one for all or (sources,). Only the fastest `limit` of each vertical direction, all where
+        it is 0; of all, those to the nodes `wanted` (sources, nodes). Targets rise within a row.
         """
-        nobody = np.empty(0, np.int64)
+        indptr = target = np.empty(0, np.int64)
+        if wanted is not None:
+            indptr = np.concatenate([[0], np.cumsum(wanted.sum(axis=1))]).astype(np.int64)
+            target = np.nonzero(wanted)[1].astype(np.int64)
         departs = np.full(source.size, departure)
-        return self._reach(position, position[source], departs, False, nobody, nobody, limit)
+        return self._reach(position, position[source], departs, False, indptr, target, limit)
 
     def reach_point(self, position: Array, point: Array, departure: float, backward: bool) -> tuple[Index, Array]:
         """The nodes that lie under the fan of a `point` (3,) [m], and the legs to them: (nodes, outcomes).
@@ -138,7 +147,8 @@ class Evaluator:
         while True:
             found = np.empty((len(points), room, reach.ROW - 1))
             task = partial(reach.reach_points, *how, *ends, counts, found)
-            in_parallel(task, len(points), NODES_AT_ONCE)
+            # a search asks for few nodes at a time: all threads shall have some
+            in_parallel(task, len(points), max(1, min(NODES_AT_ONCE, len(points) // NODES_AT_ONCE)))
             if counts.max(initial=0) <= room:
                 break
             room = int(counts.max())

@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..water.inspect import is_steady
 from .evaluator import Evaluator
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
@@ -40,8 +40,11 @@ class Legs(Protocol):
         """Some number of pairs that a node makes, to cut work by."""
         ...
 
-    def of(self, source: Index, departure: Array | None = None) -> Found:
-        """Pairs from the nodes `source`, no node twice, left at `departure` (sources,) [s] or at the problem's."""
+    def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
+        """Pairs from the nodes `source`, no node twice, left at `departure` (sources,) [s] or at the problem's.
+
+        Where `wanted` (sources, nodes) is given, others may be left out.
+        """
         ...
 
     def away(self, point: Array, departure: float | None = None) -> Attached:
@@ -81,9 +84,12 @@ class NeighbourLegs:
         some = np.linspace(0, len(self.position) - 1, SAMPLED).astype(np.int64)
         return max(1, *(len(self.neighbourhood.of(self.position[n])) for n in some))
 
-    def of(self, source: Index, departure: Array | None = None) -> Found:
+    def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
         """As Legs says."""
-        indptr, target = as_csr([self.neighbourhood.of(self.position[n]) for n in source])
+        rows = [self.neighbourhood.of(self.position[n]) for n in source]
+        if wanted is not None:
+            rows = [row[some[row]] for row, some in zip(rows, wanted, strict=True)]
+        indptr, target = as_csr(rows)
         departs = self.departure if departure is None else _by_node(self.position, source, departure)
         outcomes = self.evaluator.connect(self.position, departs, source, indptr, target)
         return Found(indptr, target, outcomes)
@@ -124,10 +130,11 @@ class ReachableLegs:
         """As Legs says."""
         return 2 * self.limit if self.limit else len(self.position)
 
-    def of(self, source: Index, departure: Array | None = None) -> Found:
-        """As Legs says."""
+    def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
+        """As Legs says; with a limit the fastest are found among all."""
         departs = self.departure if departure is None else departure
-        indptr, target, outcomes = self._fan.reach(self.position, departs, source, self.limit)
+        some = wanted if self.limit == 0 else None
+        indptr, target, outcomes = self._fan.reach(self.position, departs, source, self.limit, some)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
             departs = self.departure if departure is None else _by_node(self.position, source, departure)
             outcomes = self.evaluator.connect(self.position, departs, source, indptr, target)
