@@ -105,25 +105,58 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     click.echo(f"{planner.merge(parts, output)}\n  file:   {output}")
 
 
+ROUTE_OPTIONS = (
+    click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic."),
+    click.option("--goal", type=place, metavar="X,Y,Z", help="As --start."),
+    click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write."),
+    click.option(
+        "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
+    ),
+    click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most."),
+    click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most."),
+    click.option(
+        "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
+    ),
+    click.option(
+        "--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals."
+    ),
+    click.option(
+        "--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given."
+    ),
+    click.option(
+        "--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead."
+    ),
+    click.option(
+        "--depart-between", nargs=2, metavar="A B", help="Try departures: seconds of the flow, or times (UTC)."
+    ),
+    click.option("--every", type=float, metavar="SECONDS", help="With --depart-between: how far they lie apart."),
+    click.option("--arrive-by", metavar="T", help="Find the latest departure that arrives by a time."),
+    click.option("--figure", type=FILE, help="Travel time and arrival against departure: PNG, SVG or PDF."),
+    JSON,
+)
+
+
+def ROUTE(command: Any) -> Any:
+    """The options of what finds a route."""
+    for option in reversed(ROUTE_OPTIONS):
+        command = option(command)
+    return command
+
+
 @cli.command()
 @ROADMAP
-@click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
-@click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
-@click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
-@click.option(
-    "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
-)
-@click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
-@click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
-@click.option(
-    "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
-)
-@click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
-@click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
-@click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
-@JSON
-def query(
-    roadmap: Path,
+@ROUTE
+def query(roadmap: Path, **asked: Any) -> None:
+    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
+    from . import planner
+
+    _answer(planner.info(roadmap), planner.query, **asked)
+
+
+def _answer(
+    source: Any,
+    find: Any,
+    *,
     start: Any,
     goal: Any,
     outputs: tuple[Path, ...],
@@ -134,32 +167,57 @@ def query(
     as_card: bool,
     window_hours: float | None,
     front: bool,
+    depart_between: tuple[str, str] | None,
+    every: float | None,
+    arrive_by: str | None,
+    figure: Path | None,
     as_json: bool,
 ) -> None:
-    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
+    """Print what was asked for of a roadmap or a scenario; exit code 1 where there is no path."""
     from . import planner
 
-    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
+    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None} or None
+    departures = depart_between is not None or arrive_by is not None
+    alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+    said: Any
+    if (front or departures) and not (alone and not (front and departures)):
+        name = "--trade-off" if front else "--depart-between or --arrive-by"
+        raise click.UsageError(
+            f"{name} goes with none of --output, --most-energy, --thin, --card and --window-hours"
+            f"{', --depart-between and --arrive-by' if front else ''}; leave one of them out"
+        )
+    if not departures and (every is not None or figure is not None):
+        raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
     if front:
-        alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
-        if not alone:
-            raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
-                "leave one of them out"
-            )
-        said: Any
-        corners = planner.trade_off(roadmap, start, goal)
+        corners = planner.trade_off(source, start, goal)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+    elif departures:
+        said = planner.when_to_leave(
+            source, depart_between, every, arrive_by, start, goal, figure, surfacing=rule
+        )
+        found = said.chosen.found and (arrive_by is None or said.latest is not None)
     else:
         hours = {} if window_hours is None else {"window_hours": window_hours}
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None, **hours)
-        said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
+        path = find(source, start, goal, outputs, most_energy, thin, rule, **hours)
+        said, found = planner.card(source, path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:
         click.echo(said, err=not found)
     if not found:
         sys.exit(1)
+
+
+@cli.command()
+@click.argument("scenario")
+@ROUTE
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
+    """Find a route in SCENARIO without a roadmap: each leg leaves when the last one arrives."""
+    from . import planner
+    from .scenario import read_scenario
+
+    _answer(read_scenario(scenario, overrides), planner.plan, **asked)
 
 
 @cli.command()

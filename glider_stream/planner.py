@@ -27,6 +27,8 @@ from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
 from .scenario import Scenario, read_scenario, scenario_from_text
 from .search.choice import AnyPlanner, planner_of
+from .search.departures import Departures, Moment, seconds
+from .search.departures import when_to_leave as find_departures
 from .search.path import SURFACE, Path, load_path
 from .search.surfacing import Surfacing
 from .search.thin import thin as thinned
@@ -155,10 +157,80 @@ def query(
     is a rule for how often to come up, as `surfacing.Surfacing` has it; the scenario's own if None. Exported
     windows last `window_hours`.
     """
+    rule = None if surfacing is None else Surfacing(**surfacing)
+    return _route(*_search_in(*_source(roadmap), start, goal, rule), outputs, most_energy, thin, window_hours)
+
+
+def plan(
+    scenario: str | File | Scenario,
+    start: Point | None = None,
+    goal: Point | None = None,
+    outputs: Sequence[str | File] = (),
+    most_energy: float | None = None,
+    thin: float | None = None,
+    surfacing: Mapping[str, Any] | None = None,
+    window_hours: float = HOURS,
+    *,
+    overrides: Sequence[str] = (),
+) -> Path:
+    """The cheapest path of a scenario without a roadmap, by legs that are found as they are needed; as `query`.
+
+    Each leg leaves when the last one arrives.
+    """
+    rule = None if surfacing is None else Surfacing(**surfacing)
+    resolved = _resolved(scenario, None, overrides)
+    return _route(*_search_in(resolved, None, start, goal, rule), outputs, most_energy, thin, window_hours)
+
+
+def when_to_leave(
+    source: str | File | Scenario | Roadmap,
+    between: tuple[Moment, Moment] | None = None,
+    every: float | None = None,
+    arrive_by: Moment | None = None,
+    start: Point | None = None,
+    goal: Point | None = None,
+    figure: str | File | None = None,
+    *,
+    surfacing: Mapping[str, Any] | None = None,
+) -> Departures:
+    """Arrival and travel time against departure, of a roadmap, its file, or a scenario that was read.
+
+    Departures `between` two times, one `every` so many seconds; from the scenario's on, to the time to
+    `arrive_by`, where none are given. Times are seconds of the flow, or ISO 8601 texts (UTC). Drawn where
+    `figure` says.
+    """
+    if figure is not None:
+        from .plot import check_figure
+
+        check_figure(figure)
+    require(between is not None or arrive_by is not None, "give the departures to try between, or when to arrive")
+    rule = None if surfacing is None else Surfacing(**surfacing)
+    search, ends = _search_in(*_source(source), start, goal, rule)
+    require(not search.assembly.frozen, "frozen paths hold for one departure; leave `query.frozen` out")
+    problem = search.problem
+    by = None if arrive_by is None else seconds(arrive_by, problem, "arrive-by")
+    first, last = (problem.departure, by) if between is None else between
+    times = [seconds(one, problem, "depart-between") for one in (first, last) if one is not None]
+    found = find_departures(
+        lambda when: search.leaving(when - problem.departure).query(*ends), times[0], times[-1], every, by
+    )
+    if figure is not None:
+        from .plot import plot_departures, save_figure
+
+        save_figure(plot_departures(found), figure)
+    return found
+
+
+def _route(
+    search: AnyPlanner,
+    ends: tuple[Array | None, Array | None],
+    outputs: Sequence[str | File],
+    most_energy: float | None,
+    thin: float | None,
+    window_hours: float,
+) -> Path:
     for output in outputs:
         check_export(output)
-    rule = None if surfacing is None else Surfacing(**surfacing)
-    search, ends = _search(roadmap, start, goal, rule)
     if most_energy is None:
         path = search.query(*ends)
     else:
@@ -182,9 +254,11 @@ def _with_fewer_legs(path: Path, tolerance: float, search: AnyPlanner, most_ener
     return fewer if keeps else replace(path, unthinned=fewer.unthinned)
 
 
-def trade_off(roadmap: str | File | Roadmap, start: Point | None = None, goal: Point | None = None) -> TradeOff:
+def trade_off(
+    source: str | File | Roadmap | Scenario, start: Point | None = None, goal: Point | None = None
+) -> TradeOff:
     """Every path of one query that no other beats both in time and in energy; points as in `query`."""
-    search, ends = _search(roadmap, start, goal)
+    search, ends = _search_in(*_source(source), start, goal, None)
     _check_energy(search)
     return search.front(*ends)
 
@@ -194,10 +268,9 @@ def _check_energy(search: AnyPlanner) -> None:
     require(unit == "J", 'the roadmap\'s cost is time, without energy; build it with [cost] kind = "energy"')
 
 
-def card(roadmap: str | File | Roadmap, path: Path) -> Card:
-    """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
-    road = info(roadmap)
-    return card_of(path, scenario_from_text(road.provenance.scenario).problem())
+def card(source: str | File | Roadmap | Scenario, path: Path) -> Card:
+    """What a route of this roadmap, or scenario, makes over ground, leg by leg, and what the water does to it."""
+    return card_of(path, _source(source)[0].problem())
 
 
 def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
@@ -219,8 +292,20 @@ def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
 def _search(
     roadmap: str | File | Roadmap, start: Point | None, goal: Point | None, rule: Surfacing | None = None
 ) -> tuple[AnyPlanner, tuple[Array | None, Array | None]]:
-    road = info(roadmap)
-    scenario = scenario_from_text(road.provenance.scenario)
+    return _search_in(*_source(roadmap), start, goal, rule)
+
+
+def _source(source: str | File | Roadmap | Scenario) -> tuple[Scenario, Roadmap | None]:
+    """The scenario that is meant, and the roadmap where one is."""
+    if isinstance(source, Scenario):
+        return source, None
+    road = info(source)
+    return scenario_from_text(road.provenance.scenario), road
+
+
+def _search_in(
+    scenario: Scenario, road: Roadmap | None, start: Point | None, goal: Point | None, rule: Surfacing | None
+) -> tuple[AnyPlanner, tuple[Array | None, Array | None]]:
     ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
     if rule is None and scenario.query is not None:
         rule = Surfacing(scenario.query.most_yos, scenario.query.most_hours)
