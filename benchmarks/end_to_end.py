@@ -1,4 +1,4 @@
-"""Routes in currents that change, flown from end to end by another integrator with the trims and times they export.
+"""Routes in currents that change, flown from end to end by another integrator with what they export.
 
 Each route is planned among a scenario's nodes, written as the path file has it, read back, and flown by scipy's
 DOP853 through the flow as the planner reads it: one glide angle, heading and speed a leg, each for its exported
@@ -37,7 +37,7 @@ ANALYTIC = {
 
 
 def replayed(flow: Flow, path: dict[str, Any], *, rtol: float = 1e-9) -> np.ndarray:
-    """Where a path file's legs lead, one after the other from its start, in a flow as it changes: (legs + 1, 3)."""
+    """Where a path file's legs lead, one after the other from its start, in a flow as it changes (n, 3)."""
     at, places = np.array(path["legs"][0]["from"], float), []
     places.append(at)
     for leg in path["legs"]:
@@ -59,7 +59,9 @@ def replayed(flow: Flow, path: dict[str, Any], *, rtol: float = 1e-9) -> np.ndar
     return np.array(places)
 
 
-def one_route(scenario: Scenario, start: Any, goal: Any, nodes: np.ndarray, frozen: bool) -> dict[str, Any] | None:
+def one_route(
+    scenario: Scenario, start: Any, goal: Any, nodes: np.ndarray, frozen: bool
+) -> dict[str, Any] | None:
     """A route planned and flown: legs, hours, how far it ends from the goal and its legs from their nodes [m]."""
     problem = scenario.problem()
     path = ClockPlanner(problem, nodes, frozen=frozen).query(start, goal)
@@ -127,7 +129,7 @@ def file_route(name: str, scenario: Scenario) -> dict[str, Any]:
 def washington(file: str) -> Scenario:
     """A day and more along the coast in a three-hourly forecast."""
     return read_scenario("ionian", [
-        f"flow.file={file}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-125.9,-125.3]",
+        f"flow.file={file}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-125.9,-125.5]",
         "domain.lat=[46.8,47.9]", "sampling.shape=[26,98,2]", "query.start=[-125.6,46.9,0.0]",
         "query.goal=[-125.6,47.85,0.0]",
     ])  # fmt: skip

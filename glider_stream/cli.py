@@ -3,12 +3,16 @@
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .base.errors import InputError, Stopped
+
+if TYPE_CHECKING:
+    from .opened import OpenedScenario
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -83,9 +87,14 @@ def build(
     from . import planner
     from .base.progress import reporter
 
-    given = {"base": base, "scheduler": scheduler, "checkpoint": checkpoint}
-    job = {name: value for name, value in given.items() if value is not None}
-    run: dict[str, Any] = {"threads": threads, "overrides": overrides, "restart": restart, **job}
+    run: dict[str, Any] = {
+        "threads": threads,
+        "overrides": overrides,
+        "restart": restart,
+        "checkpoint": checkpoint,
+        "scheduler": scheduler,
+        "base": base,
+    }
     with reporter("build") as progress:
         if shard is not None:
             planner.build_part(scenario, output, shard, progress=progress, **run)
@@ -136,7 +145,7 @@ ROUTE_OPTIONS = (
 )
 
 
-def ROUTE(command: Any) -> Any:
+def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of what finds a route."""
     for option in reversed(ROUTE_OPTIONS):
         command = option(command)
@@ -145,17 +154,27 @@ def ROUTE(command: Any) -> Any:
 
 @cli.command()
 @ROADMAP
-@ROUTE
+@route_options
 def query(roadmap: Path, **asked: Any) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
-    from . import planner
+    from .opened import open
 
-    _answer(planner.info(roadmap), planner.query, **asked)
+    _answer(lambda: open(roadmap), **asked)
+
+
+@cli.command()
+@click.argument("scenario")
+@route_options
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
+    """Find a route of SCENARIO without a roadmap: each leg leaves when the last one arrives."""
+    from .opened import open_scenario
+
+    _answer(lambda: open_scenario(scenario, overrides), **asked)
 
 
 def _answer(
-    source: Any,
-    find: Any,
+    opened: "Callable[[], OpenedScenario]",
     *,
     start: Any,
     goal: Any,
@@ -174,50 +193,48 @@ def _answer(
     as_json: bool,
 ) -> None:
     """Print what was asked for of a roadmap or a scenario; exit code 1 where there is no path."""
-    from . import planner
+    from .pilot.export import check_export
+    from .search.surfacing import Surfacing
 
-    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None} or None
-    departures = depart_between is not None or arrive_by is not None
+    free = most_yos is None and most_hours is None
+    rule = None if free else Surfacing(most_yos, most_hours)
     alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+    departures = depart_between is not None or arrive_by is not None
     said: Any
-    if (front or departures) and not (alone and not (front and departures)):
-        name = "--trade-off" if front else "--depart-between or --arrive-by"
+    if front and (departures or not alone):
         raise click.UsageError(
-            f"{name} goes with none of --output, --most-energy, --thin, --card and --window-hours"
-            f"{', --depart-between and --arrive-by' if front else ''}; leave one of them out"
+            "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
+            "--depart-between and --arrive-by; leave one of them out"
+        )
+    if departures and not alone:
+        raise click.UsageError(
+            "--depart-between and --arrive-by go with none of --output, --most-energy, --thin, --card and "
+            "--window-hours; set query.departure to what they find, and ask again"
         )
     if not departures and (every is not None or figure is not None):
         raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
     if front:
-        corners = planner.trade_off(source, start, goal)
+        corners = opened().trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     elif departures:
-        said = planner.when_to_leave(
-            source, depart_between, every, arrive_by, start, goal, figure, surfacing=rule
-        )
-        found = said.chosen.found and (arrive_by is None or said.latest is not None)
+        ends: dict[str, Any] = {"start": start, "goal": goal, "surfacing": rule}
+        said = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
+        found = said.found
     else:
-        hours = {} if window_hours is None else {"window_hours": window_hours}
-        path = find(source, start, goal, outputs, most_energy, thin, rule, **hours)
-        said, found = planner.card(source, path) if as_card and path.found else path, path.found
+        for output in outputs:
+            check_export(output)
+        source = opened()
+        asked: dict[str, Any] = {} if window_hours is None else {"window_hours": window_hours}
+        path = source.query(
+            start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
+        )
+        said, found = source.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:
         click.echo(said, err=not found)
     if not found:
         sys.exit(1)
-
-
-@cli.command()
-@click.argument("scenario")
-@ROUTE
-@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
-    """Find a route in SCENARIO without a roadmap: each leg leaves when the last one arrives."""
-    from . import planner
-    from .scenario import read_scenario
-
-    _answer(read_scenario(scenario, overrides), planner.plan, **asked)
 
 
 @cli.command()

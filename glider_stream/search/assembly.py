@@ -1,6 +1,8 @@
 """Assembly: legs that a search has chosen made into the path that is flown."""
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +14,8 @@ from ..roadmap.problem import Problem
 from ..water.frame import true_north
 from ..water.inspect import is_steady
 from .path import Hop, Leg, Path
+from .surfacing import Surfacing
+from .trade_off import TradeOff
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
@@ -105,6 +109,49 @@ class Assembly:
     def _lonlat(self, *points: Array) -> Array | None:
         to_lonlat = self.problem.to_lonlat
         return None if to_lonlat is None else to_lonlat(np.stack(points))
+
+
+class RoutePlanner(ABC):
+    """What answers queries, whether from a roadmap's legs or by legs found with the clock running.
+
+    `rule`: of surfacing; its paths keep it. Points are (3,) [m]; None for the scenario's own start or goal.
+    """
+
+    def __init__(self, problem: Problem, rule: Surfacing, frozen: bool) -> None:
+        """`frozen`: in a flow that changes every leg meets the current of the departure."""
+        self.problem, self.rule, self.assembly = problem, rule, Assembly(problem, frozen)
+
+    @abstractmethod
+    def query(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> Path:
+        """The cheapest path between two points."""
+
+    @abstractmethod
+    def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
+        """The fastest path that costs no more than so much; where there is none, why."""
+
+    @abstractmethod
+    def front(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> TradeOff:
+        """Every path that no other beats both in time and in energy, by rising time."""
+
+    @abstractmethod
+    def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
+        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none."""
+
+    @abstractmethod
+    def arrivals(self, start: ArrayLike | None = None) -> Array:
+        """When each node (n,) can be reached at the soonest [s since departure]; inf where it cannot."""
+
+    @abstractmethod
+    def leaving(self, since: float) -> "RoutePlanner":
+        """The same planner for routes that leave `since` [s] later."""
+
+    def connect(self, start: Array, end: Array, since: float = 0.0) -> Edge:
+        """One glide between two points, begun `since` [s] after departure; see `Assembly.connect`."""
+        return self.assembly.connect(start, end, self.assembly.begins(since))
+
+    def fly(self, hops: list[Hop]) -> Path:
+        """The path of some legs flown again; InputError where one does not end where it says."""
+        return self.assembly.fly(hops)
 
 
 def placed_end(problem: Problem, point: ArrayLike | None, named: Array | None, name: str) -> Array:

@@ -34,9 +34,9 @@ class Departures:
     latest: Path | None = None
 
     @property
-    def chosen(self) -> Path:
-        """The latest that arrives in time where that was asked for, else the best."""
-        return self.best if self.latest is None else self.latest
+    def found(self) -> bool:
+        """Whether any departure has a path, one that arrives in time where that was asked for."""
+        return self.best.found if self.by is None else self.latest is not None
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: a row for each departure, the best and the latest."""

@@ -21,17 +21,16 @@ class SurfacingPlanner(Planner):
 
     def __init__(self, roadmap: Roadmap, problem: Problem, rule: Surfacing) -> None:
         """As Planner; the roadmap's nodes are repeated, state by state."""
-        self.base, self.rule = roadmap, rule
-        super().__init__(_layered(roadmap, rule), problem)
+        self.base = roadmap
+        super().__init__(_layered(roadmap, rule), problem, rule)
 
     def front(
         self,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
-        rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> TradeOff:
-        """As Planner, by the planner's rule; hours count as they are, not in parts."""
-        return Planner(self.base, self.problem).front(start, goal, self.rule)
+        """As RoutePlanner; hours count as they are, not in parts."""
+        return Planner(self.base, self.problem, self.rule).front(start, goal)
 
     def _start(self, point: ArrayLike | None) -> End:
         nodes, place = self._surface(point, self.problem.start, "start")

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..roadmap.pairs import Attached, Legs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
-from .assembly import Assembly, nodes_at, placed_end
+from .assembly import RoutePlanner, nodes_at, placed_end
 from .expansion import Fan
 from .labels import Aim, LabelSearch
 from .least_time import fastest_sink
@@ -65,18 +66,21 @@ class _Search:
     before: NDArray[np.int32]
 
 
-class Planner:
-    """Answers queries from one roadmap; any number, the roadmap is left as it is."""
+class Planner(RoutePlanner):
+    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is."""
 
-    rule = Surfacing()
-
-    def __init__(self, roadmap: Roadmap, problem: Problem) -> None:
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        problem: Problem,
+        rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
+    ) -> None:
         """Check that flow and glider are those that the roadmap was built with."""
         check_unchanged(roadmap, problem)
         self.roadmap = roadmap
-        self.problem = problem
-        self.assembly = Assembly(problem, frozen=True)
+        super().__init__(problem, rule, frozen=True)
         self._kept: tuple[Blend, Array] | None = None
+        self._turn_by_turn = Lock()
 
     def query(
         self,
@@ -113,9 +117,9 @@ class Planner:
         self,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
-        rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> TradeOff:
-        """Every path that no other beats both in time and in energy, by rising time; all keep the `rule`."""
+        """As RoutePlanner."""
+        rule = self.rule
         begin, end = self._start(start), self._goal(goal)
         for place, name in ((begin.point, "start"), (end.point, "goal")):
             rule.check_end(place, name)
@@ -134,20 +138,12 @@ class Planner:
         return TradeOff(tuple(self._path(begin.point, end.point, search.hops(n)) for n in found))
 
     def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
-        """The fastest path that costs no more than so much; where there is none, why."""
+        """As RoutePlanner."""
         return self.front(start, goal).within(most_cost)
 
     def leaving(self, since: float) -> "Planner":
         """The planner itself: its legs are the same at any time."""
         return self
-
-    def connect(self, start: Array, end: Array, since: float = 0.0) -> Edge:
-        """One glide between two points (3,) [m], begun `since` [s] after departure; see `Assembly.connect`."""
-        return self.assembly.connect(start, end, self.assembly.begins(since))
-
-    def fly(self, hops: list[Hop]) -> Path:
-        """The path of some legs flown again; InputError where one does not end where it says."""
-        return self.assembly.fly(hops)
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
         """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
@@ -229,7 +225,11 @@ class Planner:
         return 1 if self._graph[3] is None else 2
 
     def _search(self, start: End, blend: Blend) -> _Search:
-        """Dijkstra's algorithm from a start."""
+        """Dijkstra's algorithm from a start; one at a time, since each writes its own ways into shared arrays."""
+        with self._turn_by_turn:
+            return self._dijkstra(start, blend)
+
+    def _dijkstra(self, start: End, blend: Blend) -> _Search:
         (_, target, indptr, turn), cost = self._graph, self._costs(blend)
         states = len(indptr) - 2
         first = last = int(indptr[states])

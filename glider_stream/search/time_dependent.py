@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Array
 from ..base.settings import require
-from ..kernels.edges import Edge
 from ..roadmap.problem import Problem
-from .assembly import Assembly, nodes_at, placed_end
+from .assembly import RoutePlanner, nodes_at, placed_end
 from .expansion import ClockExpansion, Ends
 from .labels import Aim, LabelSearch
 from .least_time import GreatestSpeeds, LeastTimes
-from .path import Hop, Path
+from .path import Path
 from .surfacing import Surfacing
 from .trade_off import TradeOff, none_within
 
@@ -28,7 +27,7 @@ MOST_BINS = 240
 """How many bins of time after departure a search with bins looks at."""
 
 
-class ClockPlanner:
+class ClockPlanner(RoutePlanner):
     """Answers queries among nodes (n, 3) [m] by legs found when they are needed; any number, at any departure.
 
     As `query.Planner`, which it stands in for wherever the flow changes. A `rule` of surfacing holds with the
@@ -43,8 +42,8 @@ class ClockPlanner:
         frozen: bool = False,
     ) -> None:
         """Nothing is looked for yet."""
-        self.problem, self.position, self.rule = problem, position, rule
-        self.assembly = Assembly(problem, frozen)
+        super().__init__(problem, rule, frozen)
+        self.position = position
         self._speeds: dict[float, GreatestSpeeds] = {}
 
     def query(
@@ -120,14 +119,6 @@ class ClockPlanner:
         found: list[int | None] = [n for n in search.settled() if search.is_goal[search.labels[n].place]]
         paths = [self._path(search, expansion, number, ends, 0) for number in found or [None]]
         return TradeOff(tuple(paths))
-
-    def connect(self, start: Array, end: Array, since: float = 0.0) -> Edge:
-        """One glide between two points (3,) [m], begun `since` [s] after departure; see `Assembly.connect`."""
-        return self.assembly.connect(start, end, self.assembly.begins(since))
-
-    def fly(self, hops: list[Hop]) -> Path:
-        """The path of some legs flown again; InputError where one does not end where it says."""
-        return self.assembly.fly(hops)
 
     def _ends(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> Ends:
         """Where the ends of a query are, checked."""
