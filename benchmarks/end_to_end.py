@@ -26,13 +26,14 @@ from glider_stream.scenario import Scenario, read_scenario
 from glider_stream.search.time_dependent import ClockPlanner
 
 GYRE = "swinging-gyre"
+COARSE = "sampling.shape=[12, 6, 4]"
 ANALYTIC = {
-    "gyre, 600 s": (GYRE, ["flow.period=600.0"]),
-    "gyre, 1,500 s": (GYRE, ["flow.period=1500.0", "sampling.shape=[20, 10, 4]"]),
-    "gyre, 3,600 s": (GYRE, ["flow.period=3600.0"]),
-    "gyre, 12.42 h": (GYRE, []),
-    "tidal jet": ("tidal-strait", []),
-    "moving vortex": ("moving-vortex", []),
+    "gyre, 600 s": (GYRE, ["flow.period=600.0", COARSE]),
+    "gyre, 1,500 s": (GYRE, ["flow.period=1500.0", COARSE]),
+    "gyre, 3,600 s": (GYRE, ["flow.period=3600.0", COARSE]),
+    "gyre, 12.42 h": (GYRE, [COARSE]),
+    "wide swing, 900 s": (GYRE, ["flow.period=900.0", "flow.epsilon=0.45", COARSE]),
+    "fast, 1,800 s": (GYRE, ["flow.period=1800.0", "flow.amplitude=0.5", COARSE]),
 }
 
 

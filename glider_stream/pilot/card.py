@@ -2,14 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
 
+from ..base.clock import moment
 from ..kernels.flow import velocities
 from ..roadmap.problem import Problem
-from ..search.path import SURFACE, Leg, Path
+from ..search.path import FROZEN, SURFACE, Leg, Path
 
 DAY = 86_400.0
 
@@ -56,11 +56,6 @@ class Card:
     under: tuple[float, ...]
     best: float
 
-    def _when(self, seconds: float) -> str:
-        if self.path.departs is None:
-            return f"{seconds:,.0f} s"
-        return (self.path.departs + timedelta(seconds=seconds)).strftime("%Y-%m-%d %H:%MZ")
-
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON."""
         return {
@@ -68,6 +63,7 @@ class Card:
             "whole": self.whole.as_dict(),
             "surface_to_surface_s": list(self.under),
             "best_horizontal_mps": self.best,
+            **({} if self.path.departure is None else {"frozen": self.path.frozen}),
         }
 
     def __str__(self) -> str:
@@ -85,13 +81,13 @@ class Card:
                 f"* the water is faster than the vehicle's {self.best:.2f} m/s: "
                 f"no holding station on legs {', '.join(outrun)}"
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, *([FROZEN] if self.path.frozen else [])])
 
     def _line(self, name: str, row: Row) -> str:
         return (
             f"{name}  {row.duration / 3600:6.2f}  {row.over_ground:6.2f} m/s {daily(row.over_ground):6.1f} km/d  "
             f"{row.along:+7.2f}  {row.across:+7.2f}  {row.toward_goal:6.1f} km/d  "
-            f"{row.fastest:5.2f}{'*' if row.outrun else ' '} m/s  {self._when(row.arrives)}"
+            f"{row.fastest:5.2f}{'*' if row.outrun else ' '} m/s  {moment(self.path.departs, row.arrives)}"
         )
 
 

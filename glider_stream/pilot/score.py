@@ -6,8 +6,9 @@ from itertools import pairwise
 from typing import Any
 
 from ..base.arrays import Array
+from ..base.clock import moment, span
 from ..kernels.edges import Edge, Status
-from ..search.path import Hop, Path, hops_of
+from ..search.path import FROZEN, Hop, Path, hops_of
 
 REASONS = {
     Status.CURRENT_TOO_STRONG: "the current across it is stronger than the vehicle; go round, or with it",
@@ -39,11 +40,15 @@ class ScoredLeg:
 
 @dataclass(frozen=True)
 class Score:
-    """The legs up to the first that fails, of `asked`; `flown`, all their glides, where there are any."""
+    """The legs up to the first that fails, of `asked`; `flown`, all their glides, where there are any.
+
+    `notes`: what the route's file leaves open, and what of it was not read.
+    """
 
     legs: tuple[ScoredLeg, ...]
     asked: int
     flown: Path | None
+    notes: tuple[str, ...] = ()
 
     @property
     def flyable(self) -> bool:
@@ -71,24 +76,29 @@ class Score:
                 }
                 for leg in self.legs
             ],
+            "notes": list(self.notes),
+            **({} if self.flown is None or self.flown.departure is None else {"frozen": self.flown.frozen}),
         }
 
     def __str__(self) -> str:
+        departs = None if self.flown is None else self.flown.departs
         if self.flyable:
-            title = f"the route takes {self.time:,.0f} s"
+            arrives = "" if departs is None else f", arrives {moment(departs, self.time)}"
+            title = f"the route takes {span(self.time)}{arrives}"
         else:
             failed = self.legs[-1]
             name = failed.status.name.lower().replace("_", " ")
             title = f"leg {len(self.legs)} of {self.asked} fails: {failed.why} ({name})"
         glides = iter(() if self.flown is None else self.flown.legs)
-        lines = [title]
+        still = [FROZEN] if self.flown is not None and self.flown.frozen else []
+        lines = [title, *(f"  note: {note}" for note in (*self.notes, *still))]
         for n, leg in enumerate(self.legs, 1):
             said = "fails"
             if leg.time is not None:
-                said = f"{leg.time:,.0f} s, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
+                said = f"{span(leg.time)}, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
             if leg.status == Status.SAME_DEPTH and leg.glides:
                 said += " of the roadmap: one glide changes depth, and its ends lie at the same"
-            lines += [f"  leg {n}: {said}", *(f"    {next(glides)}" for _ in range(leg.glides))]
+            lines += [f"  leg {n}: {said}", *(f"    {next(glides).told(departs)}" for _ in range(leg.glides))]
         return "\n".join(lines)
 
 

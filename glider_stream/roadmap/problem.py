@@ -8,6 +8,8 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
+from ..kernels.flow import contains
+from ..water.domain import BoxDomain, GeographicDomain
 from .evaluator import Evaluator
 from .neighbours import NeighbourLaw, Reachable
 from .nodes import Sampler
@@ -22,7 +24,7 @@ class Problem:
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
     where known. `frozen`: queries take every leg as at the departure, though the flow changes; `bins` [s]:
     queries keep ways to one node apart that arrive in different bins of time. `flow_words`, `glider_words` say
-    what they are.
+    what they are. `domain` is that of the scenario.
     """
 
     evaluator: Evaluator
@@ -40,6 +42,7 @@ class Problem:
     departs: datetime | None = None
     frozen: bool = False
     bins: float | None = None
+    domain: BoxDomain | GeographicDomain | None = None
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""
@@ -51,9 +54,13 @@ class Problem:
         require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
         require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
         require(bool(point[2] >= self.lo[2]), f"`{name}` = {said} lies below the {deepest}; move it up")
-        inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
-        where = "outside the flow, on land or too near the seabed"
-        require(inside, f"`{name}` = {said} lies {where}; move it into open water")
+        if bool(self.evaluator.allowed(point[None], self.departure)[0]):
+            return
+        outside = "" if self.domain is None else self.domain.outside(shown[0], shown[1])
+        require(not outside, f"`{name}` = {said} lies {outside}")
+        there = contains(self.evaluator.flow, float(point[0]), float(point[1]), self.departure)
+        where = "on land, in a keep-out area or too near the seabed" if there else "outside the flow"
+        require(False, f"`{name}` = {said} lies {where}; move it into open water")
 
     def legs(self, position: Array) -> Legs:
         """How legs among these nodes (n, 3) [m] are found."""

@@ -46,7 +46,7 @@ class Assembly:
         if edge.status in EXACT_MAY_FIND and evaluator.by_fan() is not evaluator:
             exact = evaluator.by_fan().connect_pair(start, end, begins)
             edge = exact if exact.status == Status.CONNECTED else edge
-        late = edge.status == Status.CONNECTED and begins + edge.time > evaluator.flow.t_hi
+        late = edge.status == Status.CONNECTED and begins + edge.time > evaluator.flow.extent.t_hi
         return Edge(int(Status.NO_HIT), *[math.nan] * 6) if late else edge
 
     def fly(self, hops: list[Hop]) -> Path:

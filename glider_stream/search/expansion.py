@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..base.arrays import Array, Bools, Index
-from ..kernels.edges import Edge, Status
+from ..kernels.edges import EDGE_COLUMNS, STATUS, TIME, Status
 from ..roadmap.problem import Problem
 
 
@@ -101,8 +101,8 @@ class ClockExpansion:
         nodes, flow = len(self.position), self.problem.evaluator.flow
         when = np.full(time.size, self.problem.departure) if self.frozen else time
         integration = self.problem.evaluator.integration
-        self.cut |= bool(when.max() + integration.dt * integration.steps > flow.t_hi)
-        result = [Fan(np.empty(0, np.int64), np.empty((0, 7)))] * place.size
+        self.cut |= bool(when.max() + integration.dt * integration.steps > flow.extent.t_hi)
+        result = [Fan(np.empty(0, np.int64), np.empty((0, EDGE_COLUMNS)))] * place.size
         asked = np.flatnonzero(place < nodes)
         if asked.size:
             found = self.legs.of(place[asked], when[asked], wanted[asked, :nodes])
@@ -112,7 +112,7 @@ class ClockExpansion:
             away = self.legs.away(self.ends.start, float(when[int(np.argmax(place))]))
             result[int(np.argmax(place))] = Fan(away.nodes, away.outcomes)
         self._to_goals(place, when, wanted, result)
-        return [_kept(fan, float(t), flow.t_hi) for fan, t in zip(result, when, strict=True)]
+        return [_kept(fan, float(t), flow.extent.t_hi) for fan, t in zip(result, when, strict=True)]
 
     def _to_goals(self, place: Index, when: Array, wanted: Bools, result: list[Fan]) -> None:
         """Add the legs to the goals that are no nodes, and from a start that is none to all."""
@@ -144,10 +144,6 @@ class ClockExpansion:
 def _kept(fan: Fan, departure: float, last: float) -> Fan:
     """Those that connect, and arrive before the flow ends."""
     with np.errstate(invalid="ignore"):
-        fits = (fan.rows[:, 0] == Status.CONNECTED) & (departure + fan.rows[:, 1] <= last)
+        fits = (fan.rows[:, STATUS] == Status.CONNECTED) & (departure + fan.rows[:, TIME] <= last)
     return Fan(fan.target[fits], fan.rows[fits])
 
-
-def edge_of(row: Array) -> Edge:
-    """A row as an edge."""
-    return Edge(int(row[0]), *(float(value) for value in row[1:]))

@@ -17,9 +17,9 @@ from typing import Protocol
 import numpy as np
 
 from ..base.arrays import Array, Bools, Index
-from ..kernels.edges import Edge
+from ..kernels.edges import COST, GLIDE_ANGLE, TIME, Edge, edge_of
 from ..vehicle.cost import Cost
-from .expansion import Expansion, Fan, edge_of
+from .expansion import Expansion, Fan
 from .path import SURFACE, Hop
 from .surfacing import Surfacing
 
@@ -241,8 +241,8 @@ class LabelSearch:
     def _relax(self, number: int, fan: Fan) -> None:
         """Go on from a label by its legs."""
         label, rows, to = self.labels[number], fan.rows, fan.target
-        climbs = rows[:, 3] > 0
-        time, cost = label.time + rows[:, 1], label.cost + rows[:, 2]
+        climbs = rows[:, GLIDE_ANGLE] > 0
+        time, cost = label.time + rows[:, TIME], label.cost + rows[:, COST]
         if label.turns and self.inflection is not None:
             cost = cost + np.where(climbs, self.inflection[label.place], 0.0)
         half = label.half + (climbs != (label.half % 2 == 1))

@@ -102,9 +102,9 @@ def _box(flow: kernel.Flow, problem: Problem, position: Array) -> tuple[Array, A
     """The water [m] in which gliders may pass: no leg strays further from its ends than half its reach."""
     evaluator = problem.evaluator
     horizon = evaluator.integration.dt * evaluator.integration.steps
-    stray = 0.5 * (float(evaluator.polar.best_horizontal.max()) + flow.max_speed) * horizon
-    low = np.maximum(position[:, :2].min(axis=0) - stray, [flow.x_lo, flow.y_lo])
-    high = np.minimum(position[:, :2].max(axis=0) + stray, [flow.x_hi, flow.y_hi])
+    stray = 0.5 * (float(evaluator.polar.best_horizontal.max()) + flow.extent.max_speed) * horizon
+    low = np.maximum(position[:, :2].min(axis=0) - stray, [flow.extent.x_lo, flow.extent.y_lo])
+    high = np.minimum(position[:, :2].max(axis=0) + stray, [flow.extent.x_hi, flow.extent.y_hi])
     return low, np.maximum(high, low + 1.0)
 
 
@@ -119,7 +119,7 @@ def greatest(
         return _of_grid(flow, x, y, size, z, since, directions)
     period = 0.0 if is_steady(flow) else getattr(flow, "period", None)
     if period is None:  # no set of moments tells all
-        return np.full((directions.shape[1], x.size, y.size), flow.max_speed)
+        return np.full((directions.shape[1], x.size, y.size), flow.extent.max_speed)
     heights, moments = PERIODIC if period else STEADY
     finer = (np.concatenate([side - size / 4, side + size / 4]) for side in (x, y))
     fine_x, fine_y = (np.sort(side) for side in finer)
@@ -130,8 +130,8 @@ def greatest(
             uv = kernel.velocities(flow, px, py, np.full(px.size, height), np.full(px.size, t))
             found = np.maximum(found, (uv @ directions).T.reshape(found.shape))
     cells = found.reshape(directions.shape[1], x.size, 2, y.size, 2).max(axis=(2, 4))
-    spread: Array = maximum_filter(cells, (1, 3, 3)) + SPARE * flow.max_speed
-    return np.minimum(spread, flow.max_speed)
+    spread: Array = maximum_filter(cells, (1, 3, 3)) + SPARE * flow.extent.max_speed
+    return np.minimum(spread, flow.extent.max_speed)
 
 
 def _of_grid(
@@ -160,10 +160,10 @@ def _of_grid(
     i, j = (
         np.clip(np.round(near[n]).astype(np.int64), 0, flow.values.shape[2 + n] - 1) for n in range(2)
     )
-    return np.minimum(wide[:, i, j], flow.max_speed)
+    return np.minimum(wide[:, i, j], flow.extent.max_speed)
 
 
 def _indices(flow: kernel.OceanGrid, x: Array, y: Array) -> Array:
     """Fractional grid indices (2, nx, ny) at places [m], held at the rim."""
-    at = np.meshgrid((x - flow.x_lo) * flow.per_x, (y - flow.y_lo) * flow.per_y, indexing="ij")
+    at = np.meshgrid((x - flow.extent.x_lo) * flow.per_x, (y - flow.extent.y_lo) * flow.per_y, indexing="ij")
     return np.stack([map_coordinates(flow.index_map[..., n], at, order=1, mode="nearest") for n in range(2)])

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import Array
+from ..base.clock import moment
 from ..base.settings import require
 from ..roadmap.problem import Problem
+from ..roadmap.step_error import step_error
 from .assembly import RoutePlanner, nodes_at, placed_end
 from .expansion import ClockExpansion, Ends
 from .labels import Aim, LabelSearch
@@ -22,6 +24,7 @@ from .least_time import GreatestSpeeds, LeastTimes
 from .path import Path
 from .surfacing import Surfacing
 from .trade_off import TradeOff, none_within
+from .why_not import why_not
 
 MOST_BINS = 240
 """How many bins of time after departure a search with bins looks at."""
@@ -133,9 +136,9 @@ class ClockPlanner(RoutePlanner):
         return aim if bins is None else replace(aim, bins=bins, latest=self.problem.departure + MOST_BINS * bins)
 
     def _search(self, ends: Ends, aim: Aim, to_all: bool = False) -> tuple[LabelSearch, ClockExpansion]:
-        flow, departure = self.problem.evaluator.flow, self.problem.departure
-        times = f"the times of the flow, {flow.t_lo:g} to {flow.t_hi:g} s"
-        within = flow.t_lo <= departure <= flow.t_hi
+        departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
+        times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
+        within = extent.t_lo <= departure <= extent.t_hi
         require(within, f"the departure at {departure:g} s lies outside {times}; choose one of them")
         expansion = ClockExpansion(self.problem, self.position, ends, self.assembly.frozen)
         goals = np.empty(0, np.int64) if to_all else expansion.goals[0]
@@ -167,21 +170,32 @@ class ClockPlanner(RoutePlanner):
     ) -> Path:
         here = np.array_equal(ends.start, ends.goals[goal])
         if number is None and not here:
-            return self.assembly.no_path(ends.start, ends.goals[goal], self._why(expansion, search))
+            return self._no_path(expansion, search, ends.start, ends.goals[goal])
         hops = [] if number is None or here else search.hops(number)
+        if hops:
+            starts, values = np.array([hop[0] for hop in hops]), np.array([hop[2][1:] for hop in hops])
+            step_error(self.problem, starts, values).check()
         path = self.assembly.path(ends.start, ends.goals[goal], hops)
         return replace(path, expanded=search.tally.share)
 
-    def _why(self, expansion: ClockExpansion, search: LabelSearch) -> str:
-        """Why there is no path, as far as that is known."""
-        flow, problem = self.problem.evaluator.flow, self.problem
-        reached = int(search.expanded[: expansion.nodes].sum())
-        if expansion.cut and not self.assembly.frozen:
-            ends = f"{flow.t_hi:g} s"
-            if problem.departs is not None:
-                ends = f"{problem.departs + timedelta(seconds=flow.t_hi - problem.departure):%Y-%m-%d %H:%M} UTC"
-            return (
-                f"the currents' times end at {ends}, before any way that was found gets there ({reached:,} of "
-                f"{expansion.nodes:,} nodes were reached); leave earlier, or take currents that reach further"
+    def _no_path(self, expansion: ClockExpansion, search: LabelSearch, start: Array, goal: Array) -> Path:
+        """The honest no, and why, as far as that is known."""
+        problem, extent = self.problem, self.problem.evaluator.flow.extent
+        departure, times = problem.departure, np.full(expansion.nodes, math.inf)
+        for label in search.labels:
+            if label.place < expansion.nodes:
+                times[label.place] = min(times[label.place], label.time - departure)
+        path = self.assembly.no_path(start, goal)
+        if not expansion.nodes:
+            return path
+        clock = self.assembly.changes and not self.assembly.frozen
+        reason = why_not(problem, self.position, times, start, goal, clock)
+        why = str(reason)
+        if expansion.cut and clock:
+            ends = moment(problem.departs, extent.t_hi - departure)
+            ends = ends if problem.departs is not None else f"{extent.t_hi:,.0f} s"
+            why = (
+                f"the currents' times end at {ends}, and no way that was found gets there before; leave earlier, "
+                f"or take currents that reach further; else {why}"
             )
-        return ""
+        return replace(path, why=why, why_not=reason.as_dict(), expanded=search.tally.share)

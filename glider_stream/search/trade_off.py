@@ -9,13 +9,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Bools, Index
-from ..kernels.edges import Edge, Status
+from ..base.clock import span
+from ..kernels.edges import COST, EDGE_COLUMNS, GLIDE_ANGLE, TIME, Edge, Status
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
 from ..vehicle.cost import Cost
 from .expansion import Fan
-from .path import Path
+from .path import FROZEN, Path
 
-NO_LEGS = Fan(np.empty(0, np.int64), np.empty((0, 1 + len(EDGE_FIELDS))))
+NO_LEGS = Fan(np.empty(0, np.int64), np.empty((0, EDGE_COLUMNS)))
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,16 @@ class TradeOff:
     def as_dict(self) -> dict[str, Any]:
         """For JSON: each path's time, energy and number of legs."""
         rows = [(path.travel_time, path.cost, len(path.legs)) for path in self.paths]
-        return {"trade_off": [{"travel_time_s": t, "energy_j": e, "legs": n} for t, e, n in rows]}
+        still = {} if self.paths[0].departure is None else {"frozen": self.paths[0].frozen}
+        return {"trade_off": [{"travel_time_s": t, "energy_j": e, "legs": n} for t, e, n in rows], **still}
 
     def __str__(self) -> str:
-        lines = ["   time       energy   legs"]
+        lines = ["   time                energy   legs"]
         lines += [
-            f"{path.travel_time:9,.0f} s {path.cost / 1000:9,.2f} kJ  {len(path.legs):4}" for path in self.paths
+            f"{span(path.travel_time):>20} {path.cost / 1000:9,.2f} kJ  {len(path.legs):4}" for path in self.paths
         ]
-        return "\n".join([*lines, "the whole front: no path is better than one of these in both"])
+        still = [FROZEN] if self.paths[0].frozen else []
+        return "\n".join([*lines, "the whole front: no path is better than one of these in both", *still])
 
 
 def none_within(least: Path, energy: float) -> Path:
@@ -142,15 +145,15 @@ class LeftInRoadmap:
         source = np.repeat(np.arange(len(fans)), [fan.target.size for fan in fans])
         target = np.concatenate([fan.target for fan in fans])
         rows = np.concatenate([fan.rows for fan in fans])
-        climbs = rows[:, 3] > 0
-        time = _backward(target, source, rows[:, 1], goals, len(fans))
+        climbs = rows[:, GLIDE_ANGLE] > 0
+        time = _backward(target, source, rows[:, TIME], goals, len(fans))
         turn = cost.inflection(self.expansion.places[:, 2])
         if turn is None:
-            return time, _backward(target, source, rows[:, 2], goals, len(fans))
+            return time, _backward(target, source, rows[:, COST], goals, len(fans))
         # twice each place: come to by a dive (even), from where a climb costs a turn, and by a climb (odd)
         ends = np.concatenate([2 * target + climbs, 2 * target + climbs])
         begins = np.concatenate([2 * source, 2 * source + 1])
-        costs = np.concatenate([rows[:, 2] + np.where(climbs, turn[source], 0.0), rows[:, 2]])
+        costs = np.concatenate([rows[:, COST] + np.where(climbs, turn[source], 0.0), rows[:, COST]])
         both = _backward(ends, begins, costs, np.concatenate([2 * goals, 2 * goals + 1]), 2 * len(fans))
         return time, np.asarray(both.reshape(-1, 2).min(axis=1))
 

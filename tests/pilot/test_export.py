@@ -12,8 +12,10 @@ from helpers.routes import STOPS, assert_places, route
 
 from glider_stream.base.errors import InputError
 from glider_stream.pilot.export import ANYWHERE, EXPORTS, export_path
-from glider_stream.pilot.slocum import goto_list, lint, mission_files
+from glider_stream.pilot.slocum import goto_list, mission_files
+from glider_stream.pilot.slocum_files import goto_faults as lint
 from glider_stream.pilot.waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
+from glider_stream.search.path import FROZEN
 from glider_stream.water.frame import LocalFrame
 
 
@@ -53,7 +55,7 @@ def test_gpx(tmp_path):
             for one in root.iterfind(f".//g:{tag}", names)
         ]
 
-    assert_places(places("rtept"), STOPS[1:])
+    assert_places(places("rtept"))
     assert_places(places("trkpt")[::4])
 
 
@@ -125,7 +127,7 @@ def test_slocum_files_follow_the_rules(tmp_path):
     assert_places(list(zip(lon, lat, [0, 0], strict=True)), [[*stop[:2], 0.0] for stop in STOPS[2:]])
     yo = (tmp_path / "yo10.ma").read_text()
     assert "d_target_depth(m) 200\n" in yo
-    assert "d_pitch_value(rad) -0.4000\n" in yo
+    assert "d_pitch_value(X) -0.4000\n" in yo
 
 
 def test_many_waypoints_take_several_lists():
@@ -203,3 +205,23 @@ def test_only_json_says_that_there_is_no_path(tmp_path, form):
 def test_a_goto_list_has_its_vehicles_name(tmp_path):
     with pytest.raises(InputError, match=r"goto_lNN\.ma.*route\.ma"):
         export_path(route(), tmp_path / "route.ma")
+
+
+def test_every_file_of_a_frozen_route_says_so(tmp_path):
+    still = replace(route(), departure=0.0, frozen=True)
+    for form in ("a.json", "a.csv", "a.windows.csv", "a.geojson", "a.windows.geojson", "a.kml", "a.gpx", "targets"):
+        written = export_path(still, tmp_path / form)
+        told = [file.read_text(encoding="utf-8") for file in written]
+        if form == "a.json":
+            assert json.loads(told[0])["frozen"] is True
+        else:
+            assert all(FROZEN in text for text in told), form
+        if form.endswith("csv"):
+            rows = list(csv.DictReader(told[0].splitlines()))
+            assert {row["note"] for row in rows} == {FROZEN}
+        export_path(replace(still, frozen=False), tmp_path / form)
+        assert FROZEN not in (tmp_path / form).read_text(encoding="utf-8")
+    for file in export_path(still, tmp_path / "goto_l20.ma"):
+        assert FROZEN in file.read_text(encoding="ascii")
+        if file.name.startswith("goto"):
+            assert lint(file.read_text(encoding="ascii")) == []
