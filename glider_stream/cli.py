@@ -2,14 +2,16 @@
 
 import json
 import os
+import re
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .base.errors import InputError, Stopped
+from .base.errors import InputError, InputWarning, Stopped
 
 if TYPE_CHECKING:
     from .opened import OpenedScenario
@@ -33,17 +35,21 @@ def place_and_time(text: str) -> tuple[Any, ...]:
 
 
 def key_and_value(text: str) -> tuple[str, Any]:
-    """A key, and its value: a whole number, or a text."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip() or not value.strip():
+    """A key, and its value: a number, or a text."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE, such as units=cm/s")
-    return key.strip(), int(value) if value.strip().isdecimal() else value.strip()
+    if value.isdecimal():
+        return key, int(value)
+    return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
 def _write_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=1))
 
 
+TRACE = "GLIDER_STREAM_TRACE"
+"""Name of the variable of the environment that shows the trace of an error of this program."""
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
@@ -449,9 +455,10 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
+    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input, 3 an error of this program."""
     try:
         _check_environment()
+        _show_warnings()
         cli(prog_name="glider-stream", standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
@@ -472,6 +479,29 @@ def main() -> None:
         stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
         click.echo(f"glider-stream: {stopped}", err=True)
         sys.exit(130)
+    except Exception as error:
+        if os.environ.get(TRACE):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        click.echo(
+            f"glider-stream: an error of this program, and not of your input: {what}; "
+            f"please report it, with what {TRACE}=1 in the environment shows",
+            err=True,
+        )
+        sys.exit(3)
+
+
+def _show_warnings() -> None:
+    """Warnings on input in one line, without the place in this program."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+        if issubclass(category, InputWarning):
+            click.echo(f"glider-stream: warning: {message}", err=True)
+        else:
+            usual(message, category, *rest, **named)
+
+    warnings.showwarning = show
 
 
 def _check_environment() -> None:

@@ -51,3 +51,19 @@ def check_links(path: str | Path) -> None:
                 elif isinstance(one, h5py.Dataset):
                     own = not one.external and not one.is_virtual
                     require(own, f"the data of `{name}` in {path} lie in other files, not followed: copy them in")
+
+
+def groups_of(path: str | Path) -> tuple[list[str], set[str]]:
+    """The names of all groups of a file, and of those with data of two dimensions or more; "" is the root."""
+    every: list[str] = []
+    grids: set[str] = set()
+
+    def look(name: str, one: object) -> None:
+        if isinstance(one, h5py.Group):
+            every.append(name)
+        elif isinstance(one, h5py.Dataset) and one.ndim >= 2:
+            grids.add(name.rpartition("/")[0])
+
+    with h5py.File(path, "r") as file:
+        file.visititems(look)
+    return every, grids
