@@ -10,7 +10,7 @@ from .base.output import check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
-from .opened import OpenedRoadmap
+from .opened import OpenedRoadmap, open_scenario
 from .opened import open as open_roadmap
 from .pilot.card import Card
 from .pilot.export import check_export
@@ -185,13 +185,39 @@ def query(
     )
 
 
+def plan(
+    scenario: str | File | Scenario,
+    start: Point | None = None,
+    goal: Point | None = None,
+    outputs: Sequence[str | File] = (),
+    most_energy: float | None = None,
+    thin: float | None = None,
+    surfacing: Surfacing | None = None,
+    window_hours: float = HOURS,
+    *,
+    overrides: Sequence[str] = (),
+) -> Path:
+    """The cheapest path of a scenario without a roadmap; all else as in `query`."""
+    for output in outputs:
+        check_export(output)
+    return open_scenario(scenario, overrides).query(
+        start,
+        goal,
+        outputs=outputs,
+        most_energy=most_energy,
+        thin=thin,
+        surfacing=surfacing,
+        window_hours=window_hours,
+    )
+
+
 def trade_off(
     roadmap: AnyRoadmap,
     start: Point | None = None,
     goal: Point | None = None,
     surfacing: Surfacing | None = None,
 ) -> TradeOff:
-    """The paths of one query that are best for some price of time against energy; all else as in `query`."""
+    """Every path of one query that no other beats both in time and in energy; all else as in `query`."""
     return open_roadmap(roadmap).trade_off(start, goal, surfacing=surfacing)
 
 

@@ -1,0 +1,60 @@
+"""The planner over a roadmap of several departures: fastest routes by its slices, all else as without."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..roadmap.problem import Problem
+from ..roadmap.slices import SlicedRoadmap
+from .labels import Aim
+from .path import Path
+from .sliced import SliceSearch
+from .surfacing import Surfacing
+from .time_dependent import ClockPlanner
+
+
+class SlicePlanner(ClockPlanner):
+    """Answers queries with the clock running over slices, which a fastest route between two points is found by.
+
+    What slices cannot answer (a rule of surfacing, energy, bins of time, many goals, a departure outside them, or
+    no way that they know) is searched for by legs found when they are needed, as by `ClockPlanner`.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        roadmap: SlicedRoadmap,
+        rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
+    ) -> None:
+        """InputError where flow, terrain or glider are not those that the roadmap was built with."""
+        super().__init__(problem, roadmap.position, rule)
+        self.slices = SliceSearch(roadmap, problem)
+
+    def leaving(self, since: float) -> "SlicePlanner":
+        """The same planner for routes that leave `since` [s] later."""
+        later = super().leaving(since)
+        found = SlicePlanner.__new__(SlicePlanner)
+        found.__dict__.update(later.__dict__)
+        found.slices = self.slices
+        return found
+
+    def _query(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim) -> Path:
+        first, last = self.slices.roadmap.departures[[0, -1]]
+        problem = self.problem
+        by_slices = (
+            self.rule == Surfacing()
+            and problem.bins is None
+            and problem.evaluator.cost.unit == "s"
+            and aim == Aim(by_cost=True)
+            and first <= problem.departure <= last
+        )
+        if not by_slices:
+            return super()._query(start, goal, aim)
+        ends = self._ends(start, [goal])
+        if np.array_equal(ends.start, ends.goals[0]):
+            return self.assembly.path(ends.start, ends.goals[0], [])
+        hops, agreement = self.slices.fastest(ends.start, ends.goals[0], problem.departure)
+        if hops is None:
+            return super()._query(start, goal, aim)
+        return replace(self.assembly.path(ends.start, ends.goals[0], hops), notes=(str(agreement),))
