@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..roadmap.problem import Problem
-from ..roadmap.slices import SlicedRoadmap
 from .labels import Aim
 from .path import Path
 from .sliced import SliceSearch
@@ -24,20 +23,18 @@ class SlicePlanner(ClockPlanner):
     def __init__(
         self,
         problem: Problem,
-        roadmap: SlicedRoadmap,
+        slices: SliceSearch,
         rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> None:
-        """InputError where flow, terrain or glider are not those that the roadmap was built with."""
-        super().__init__(problem, roadmap.position, rule)
-        self.slices = SliceSearch(roadmap, problem)
+        """Over the nodes of a roadmap of slices, whose search is made already."""
+        super().__init__(problem, slices.roadmap.position, rule)
+        self.slices = slices
 
     def leaving(self, since: float) -> "SlicePlanner":
         """The same planner for routes that leave `since` [s] later."""
-        later = super().leaving(since)
-        found = SlicePlanner.__new__(SlicePlanner)
-        found.__dict__.update(later.__dict__)
-        found.slices = self.slices
-        return found
+        later = SlicePlanner(super().leaving(since).problem, self.slices, self.rule)
+        later._speeds = self._speeds
+        return later
 
     def _query(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim) -> Path:
         first, last = self.slices.roadmap.departures[[0, -1]]
