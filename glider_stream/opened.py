@@ -313,6 +313,8 @@ def open_either(source: "str | File | Roadmap | SlicedRoadmap | Scenario | Opene
     """Open a roadmap, or a scenario where an object, or a file that ends in .toml, is one."""
     if isinstance(source, OpenedScenario):
         return source
-    if isinstance(source, Scenario) or (not isinstance(source, Roadmap | SlicedRoadmap) and File(source).suffix == ".toml"):
+    if isinstance(source, Scenario):
         return open_scenario(source)
-    return open(source)
+    if isinstance(source, Roadmap | SlicedRoadmap) or File(source).suffix != ".toml":
+        return open(source)
+    return open_scenario(source)

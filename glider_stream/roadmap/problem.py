@@ -24,7 +24,7 @@ class Problem:
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
     where known. `frozen`: queries take every leg as at the departure, though the flow changes; `bins` [s]:
     queries keep ways to one node apart that arrive in different bins of time. `flow_words`, `glider_words` say
-    what they are. `domain` is that of the scenario. `slices`: the departures [s], rising, of a roadmap of several.
+    what they are. `domain` is that of the scenario. `slices`: departures [s], rising, of a roadmap of several.
     """
 
     evaluator: Evaluator

@@ -17,6 +17,7 @@ from .layered import SurfacingPlanner
 from .path import SURFACE, Path
 from .query import Planner
 from .slice_planner import SlicePlanner
+from .sliced import SliceSearch
 from .surfacing import Surfacing
 from .thin import thin
 from .time_dependent import ClockPlanner
@@ -29,12 +30,12 @@ Ends = tuple[Array | None, Array | None]
 def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing) -> RoutePlanner:
     """The planner whose paths keep a rule of surfacing, over a roadmap, or over a scenario's nodes if None.
 
-    In a flow that changes the clock runs, and a roadmap gives its nodes alone, or its slices where it has several;
+    In a flow that changes the clock runs, and a roadmap gives its nodes alone, or its slices where it has some;
     but where the problem is `frozen`.
     """
     if isinstance(roadmap, SlicedRoadmap):
         if not problem.frozen:
-            return SlicePlanner(problem, roadmap, rule)
+            return SlicePlanner(problem, SliceSearch(roadmap, problem), rule)
         roadmap = _slice_of(roadmap, problem.departure)
     if roadmap is None:
         return ClockPlanner(problem, node_positions(problem), rule, problem.frozen)
