@@ -8,10 +8,16 @@ import pytest
 from helpers.slices import arrival_by_labels, problem, sliced
 from scipy.integrate import solve_ivp
 
+import glider_stream
 from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
 from glider_stream.kernels.flow import velocity
+from glider_stream.roadmap.compare import difference
+from glider_stream.search.answer import planner_of
+from glider_stream.search.slice_planner import SlicePlanner
 from glider_stream.search.sliced import SliceSearch
+from glider_stream.search.surfacing import Surfacing
+from glider_stream.search.time_dependent import ClockPlanner
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +108,26 @@ def test_no_way_is_the_honest_no():
     hops, agreement = SliceSearch(empty, problem()).fastest(road.position[-2], road.position[-1], 0.0)
     assert hops is None
     assert agreement.agreed
+
+
+def test_a_query_of_slices_is_a_query(search):
+    road = glider_stream.open(sliced())
+    path = road.query()
+    assert isinstance(road.planner(), SlicePlanner)
+    assert path.clock_runs
+    assert "slices and truth differ by" in path.notes[0]
+    by_labels = ClockPlanner(problem(), sliced().position).query()
+    assert abs(path.travel_time - by_labels.travel_time) <= 0.01 * by_labels.travel_time
+    later = road.planner().leaving(700.0)
+    assert isinstance(later, SlicePlanner)
+    assert later.query().departure == 700.0
+    assert np.isfinite(road.arrivals()).sum() > 10
+    assert road.why_no_edges() == ""
+
+
+def test_frozen_paths_need_a_slice_of_their_departure():
+    road = sliced()
+    frozen = planner_of(replace(problem(), frozen=True, departure=600.0), road, Surfacing())
+    assert difference(frozen.roadmap, road.at(1)).same_edges
+    with pytest.raises(InputError, match="no slice of the roadmap; choose one of: 0, 600, 1200, 1800 s"):
+        planner_of(replace(problem(), frozen=True, departure=601.0), road, Surfacing())

@@ -1,0 +1,90 @@
+"""What slices cost and lose against fans, and what a query over them takes: `slices.py [SCENARIO] [--set ...]`."""
+
+import time
+from dataclasses import replace
+from statistics import median
+
+import click
+import numpy as np
+
+from glider_stream.base.threads import threads
+from glider_stream.kernels.edges import CONNECTED, STATUS, TIME
+from glider_stream.roadmap.builder import build_slices, node_positions, warm_up
+from glider_stream.roadmap.follow import Follower
+from glider_stream.scenario import read_scenario
+from glider_stream.search.sliced import SliceSearch
+
+
+def edges(found, nodes):
+    """A number for each edge, by its row and target, and its time."""
+    row = np.repeat(np.arange(len(found.indptr) - 1), np.diff(found.indptr))
+    met = found.outcomes[:, STATUS] == CONNECTED
+    return (row * nodes + found.target)[met], found.outcomes[met, TIME]
+
+
+def compare(problem, position, every):
+    """Each slice of some nodes by following and by fans: edges, time; processor time of both, in one run."""
+    source = np.arange(0, len(position), every)
+    slices = Follower.of(problem, position).slices(source)
+    for departure in problem.departures:
+        began = time.process_time()
+        followed = next(slices)
+        follows = time.process_time() - began
+        began = time.process_time()
+        fan = replace(problem, departure=departure, slices=()).legs(position).of(source)
+        fans = time.process_time() - began
+        (mine, my_times), (theirs, their_times) = (edges(one, len(position)) for one in (followed, fan))
+        both, a, b = np.intersect1d(mine, theirs, return_indices=True)
+        later = my_times[a] - their_times[b]
+        print(
+            f"{departure:9.0f} s: {theirs.size:,} edges by fans, {1 - both.size / theirs.size:.2%} of them not "
+            f"followed, {1 - both.size / mine.size:.2%} followed alone; {np.mean(later > 1):.2%} more than 1 s "
+            f"later; cost {follows / fans:.2f}"
+        )
+
+
+def ask(problem, road, count):
+    """Queries between random nodes at random departures: seconds each, rounds, how far slices were off."""
+    random = np.random.default_rng(0)
+    search = SliceSearch(road, problem)
+    took, rounds, off = [], [], []
+    for _ in range(count):
+        start, goal = road.position[random.choice(len(road.position), 2, replace=False)]
+        departure = random.uniform(road.departures[0], road.departures[-1])
+        began = time.perf_counter()
+        _, agreement = search.fastest(start, goal, departure)
+        took.append(time.perf_counter() - began)
+        rounds.append(agreement.rounds)
+        off.append(agreement.most)
+    print(
+        f"{count} queries: {median(took):.3f} s, {max(took):.3f} s at most; {median(rounds):.0f} searches, "
+        f"{max(rounds)} at most; slices off by {median(off):.2g} s, {max(off):.2g} s at most"
+    )
+
+
+@click.command()
+@click.argument("scenario", default="swinging-gyre")
+@click.option("--set", "overrides", multiple=True)
+@click.option("--first", default=0.0)
+@click.option("--last", default=44714.0)
+@click.option("--count", default=24, help="Slices.")
+@click.option("--every", default=12, help="One node in so many is compared; 0 for none.")
+@click.option("--queries", default=20, help="Queries over the whole roadmap; 0 for none.")
+def main(scenario, overrides, first, last, count, every, queries):
+    """Compare, build and ask."""
+    problem = read_scenario(scenario, overrides).problem()
+    problem = replace(problem, slices=tuple(np.linspace(first, last, count).tolist()))
+    position = node_positions(problem)
+    warm_up(problem)
+    if every:
+        with threads(1):
+            compare(problem, position, every)
+    if queries:
+        road = build_slices(problem)
+        print(f"{len(position):,} nodes, {count} slices, {road.target.size:,} edges in {road.wall_s:.1f} s")
+        SliceSearch(road, problem).fastest(position[-2], position[-1], first)
+        ask(problem, road, queries)
+
+
+if __name__ == "__main__":
+    main()
