@@ -1,4 +1,4 @@
-"""What slices cost and lose against fans, and what a query over them takes: `slices.py [SCENARIO] [--set ...]`."""
+"""What slices cost and lose against fans, and what a query over them takes: `slices.py [SCENARIO] [--set K=V]`."""
 
 import time
 from dataclasses import replace
