@@ -1,4 +1,4 @@
-"""What slices cost and lose against fans, and what a query over them takes: `slices.py [SCENARIO] [--set K=V]`."""
+"""What slices cost and lose against fans, and what a query over them takes: `slices.py [SCENARIO] [--set ..]`."""
 
 import time
 from dataclasses import replace
