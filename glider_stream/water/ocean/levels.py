@@ -83,9 +83,9 @@ def levels_of(at: Catalogue, variable: Any, axes: dict[str, tuple[str, str]]) ->
     bounds = _bounds(at, name, depth, factor, order)
     if bounds is not None:
         lower, bottom = bounds[0], f"the lower face of the deepest layer with data (`{bounds[1]}`)"
-    dim, top = axes["depth"][0] if "depth" in axes else None, held_above(depth)
+    along, top = axes["depth"][0] if "depth" in axes else None, held_above(depth)
     extent = f"{top:.4g} to {depth[-1]:.6g} m"
-    return Levels(depth, lower, top, order, dim, name, None, words, bottom, extent=extent)
+    return Levels(depth, lower, top, order, along, name, None, words, bottom, extent=extent)
 
 
 def _between_faces(at: Catalogue, dim: str, name: str) -> Levels:
