@@ -22,7 +22,7 @@ from .roadmap.builder import node_positions
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
-from .scenario import Scenario, read_scenario, scenario_from_text
+from .scenario import Scenario, read_scenario, scenario_from_text, shipped_scenarios
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
@@ -303,9 +303,11 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
 
 
 def open_either(source: "str | File | Roadmap | Scenario | OpenedScenario") -> OpenedScenario:
-    """Open a roadmap, or a scenario where an object, or a file that ends in .toml, is one."""
+    """Open a roadmap, or a scenario: an object, a file that ends in .toml, or the name of a shipped one."""
     if isinstance(source, OpenedScenario):
         return source
-    if isinstance(source, Scenario) or (not isinstance(source, Roadmap) and File(source).suffix == ".toml"):
+    if isinstance(source, Scenario):
+        return open_scenario(source)
+    if not isinstance(source, Roadmap) and (File(source).suffix == ".toml" or str(source) in shipped_scenarios()):
         return open_scenario(source)
     return open(source)

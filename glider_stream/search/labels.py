@@ -259,6 +259,9 @@ class LabelSearch:
         criteria = self._criteria(to, time, cost, ~climbs, half, surfaced)
         fits &= ~_any_beats(self.best[to], criteria)
         for n in np.flatnonzero(fits):
+            # a fan may hold two legs to one place: its own, and that from end to end
+            if np.all(self.best[to[n]] <= criteria[n], axis=1).any():
+                continue
             new = Label(
                 int(to[n]), float(time[n]), float(cost[n]), not climbs[n], int(half[n]), float(surfaced[n]),
                 number, rows[n],
