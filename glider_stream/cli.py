@@ -198,18 +198,35 @@ def verify(roadmap: Path, sample: int, as_json: bool) -> None:
 
 @cli.command()
 @ROADMAP
-@click.argument("path", required=False, type=FILE)
+@click.argument("paths", nargs=-1, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
-@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
+@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for one route.")
 @click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
-@click.option("--fronts", type=float, metavar="HOURS", help="As --chart, with what is reached every HOURS.")
+@click.option("--fronts", type=float, metavar="HOURS", help="A chart, with what is reached every HOURS.")
 def plot(
-    roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], chart: bool, fronts: float | None
+    roadmap: Path,
+    paths: tuple[Path, ...],
+    output: Path,
+    depths: tuple[float, ...],
+    chart: bool,
+    fronts: float | None,
 ) -> None:
-    """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
+    """Draw the route in PATHS (JSON, from query) over ROADMAP's current; without PATHS, the roadmap.
+
+    Two to four files are drawn side by side, to compare the routes.
+    """
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts)
+    if len(paths) > 1:
+        if chart or fronts is not None or len(depths) > 1:
+            raise click.UsageError(
+                "several routes go with one --depth, and without --chart and --fronts; leave these out, or "
+                "give one route"
+            )
+        planner.plot_routes(roadmap, paths, output, depths[0] if depths else None)
+    else:
+        path = paths[0] if paths else None
+        planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts)
     click.echo(output)
 
 
