@@ -83,9 +83,14 @@ def build(
     from . import planner
     from .base.progress import reporter
 
-    given = {"base": base, "scheduler": scheduler, "checkpoint": checkpoint}
-    job = {name: value for name, value in given.items() if value is not None}
-    run: dict[str, Any] = {"threads": threads, "overrides": overrides, "restart": restart, **job}
+    run: dict[str, Any] = {
+        "threads": threads,
+        "overrides": overrides,
+        "restart": restart,
+        "checkpoint": checkpoint,
+        "scheduler": scheduler,
+        "base": base,
+    }
     with reporter("build") as progress:
         if shard is not None:
             planner.build_part(scenario, output, shard, progress=progress, **run)
@@ -137,9 +142,13 @@ def query(
     as_json: bool,
 ) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
-    from . import planner
+    from .opened import open
+    from .pilot.export import check_export
+    from .search.surfacing import Surfacing
 
-    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
+    free = most_yos is None and most_hours is None
+    rule = None if free else Surfacing(most_yos, most_hours)
+    said: Any
     if front:
         alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
         if not alone:
@@ -147,13 +156,17 @@ def query(
                 "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
                 "leave one of them out"
             )
-        said: Any
-        corners = planner.trade_off(roadmap, start, goal)
+        corners = open(roadmap).trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        hours = {} if window_hours is None else {"window_hours": window_hours}
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None, **hours)
-        said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
+        for output in outputs:
+            check_export(output)
+        road = open(roadmap)
+        asked: dict[str, Any] = {} if window_hours is None else {"window_hours": window_hours}
+        path = road.query(
+            start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
+        )
+        said, found = road.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:

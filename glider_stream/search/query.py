@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class _Search:
 
 
 class Planner:
-    """Answers queries from one roadmap; any number, the roadmap is left as it is."""
+    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is."""
 
     def __init__(self, roadmap: Roadmap, problem: Problem) -> None:
         """Check that flow and glider are those that the roadmap was built with."""
@@ -73,6 +74,7 @@ class Planner:
         self.roadmap = roadmap
         self.problem = problem
         self._kept: tuple[Blend, Array] | None = None
+        self._turn_by_turn = Lock()
 
     def query(
         self,
@@ -216,7 +218,11 @@ class Planner:
         return 1 if self._graph[3] is None else 2
 
     def _search(self, start: End, blend: Blend) -> _Search:
-        """Dijkstra's algorithm from a start."""
+        """Dijkstra's algorithm from a start; one at a time, since each writes its own ways into shared arrays."""
+        with self._turn_by_turn:
+            return self._dijkstra(start, blend)
+
+    def _dijkstra(self, start: End, blend: Blend) -> _Search:
         (_, target, indptr, turn), cost = self._graph, self._costs(blend)
         states = len(indptr) - 2
         first = last = int(indptr[states])
