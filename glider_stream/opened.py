@@ -1,6 +1,6 @@
 """An opened roadmap: roadmap, problem and searches, each made once, when it is first needed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as File
 from threading import RLock
 from typing import TYPE_CHECKING, TypeVar
@@ -162,6 +162,28 @@ class OpenedRoadmap:
             return draw_roadmap(self.roadmap, self.problem, output, depths, self.title)
         how = output, depths, chart, fronts, free.arrivals
         return draw_route(self.roadmap, self.problem, route, *how, self.title)
+
+    def plot_routes(
+        self,
+        paths: Sequence[str | File] | Mapping[str, Path],
+        output: str | File | None = None,
+        depth: float | None = None,
+    ) -> "Figure":
+        """Draw two to four paths of this water side by side, with their times, over the current at a `depth` [m].
+
+        `paths` are path files, which are called by their names without the ending, or paths by name. Without
+        a `depth` the middle of the box is drawn. The figure is written where `output` says.
+        """
+        from .plot.draw import check_drawing, draw_routes
+
+        check_drawing(output, None, None, False, None)
+        routes = (
+            dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_path(path) for path in paths}
+        )
+        named = f"each path needs a name of its own; got {', '.join(map(str, paths))}; rename a file"
+        require(len(routes) == len(paths), named)
+        self.planner(Surfacing())  # which compares the water with the roadmap's
+        return draw_routes(self.roadmap, self.problem, routes, output, depth, self.title)
 
     def _point(self, values: Point) -> Array:
         return self.scenario.domain.point(values)

@@ -227,36 +227,13 @@ def plot(
 
 
 def plot_routes(
-    roadmap: str | File | Roadmap,
+    roadmap: AnyRoadmap,
     paths: Sequence[str | File] | Mapping[str, Path],
     output: str | File | None = None,
     depth: float | None = None,
 ) -> "Figure":
-    """Draw two to four paths of one problem side by side, with their times; over the current at a `depth` [m].
-
-    Path files, which are called by their names without the ending, or objects by name. The middle of the box
-    is the depth where none is given. Written where `output` says.
-    """
-    from .plot import check_figure, plot_routes, save_figure
-
-    if output is not None:
-        check_figure(output)
-    road = info(roadmap)
-    routes = dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_path(path) for path in paths}
-    same = f"each path needs a name of its own; got {', '.join(map(str, paths))}; rename a file"
-    require(len(routes) == len(paths), same)
-    problem = scenario_from_text(road.provenance.scenario).problem()
-    check_unchanged(road, problem)
-    evaluator = problem.evaluator
-    for name, route in routes.items():
-        stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
-        here = bool(evaluator.allowed(stops, problem.departure).all())
-        require(here, f"the path {name} leaves the roadmap's water; draw paths that were found in one water")
-    title = "Routes" if isinstance(roadmap, Roadmap) else File(roadmap).stem
-    figure = plot_routes(evaluator.flow, evaluator.terrain, problem, road.position, routes, depth, title)
-    if output is not None:
-        save_figure(figure, output)
-    return figure
+    """Draw two to four paths of one problem side by side; see `OpenedRoadmap.plot_routes`."""
+    return open_roadmap(roadmap).plot_routes(paths, output, depth)
 
 
 def plot_steering(

@@ -67,7 +67,9 @@ def plot_routes(
                 axes.plot(*drawn[:, :columns].T, color="white", linewidth=4.6, zorder=5)
                 label = f"{name}: {legs}, {_seconds(path.travel_time)}" if columns == 3 else None
                 axes.plot(*drawn[:, :columns].T, linewidth=2.4, label=label, **look)
-            chart.scatter(*stops[1:-1, :2].T, s=15, color="white", edgecolors=colour, linewidths=1.1, zorder=7)
+            chart.scatter(
+                stops[1:-1, 0], stops[1:-1, 1], s=15, color="white", edgecolors=colour, linewidths=1.1, zorder=7
+            )
             draw_ends(space, stops)
             draw_ends(chart, stops[:, :2])
         handles, labels = space.get_legend_handles_labels()

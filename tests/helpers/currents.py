@@ -10,9 +10,9 @@ def write_ionian(file):
     lon, lat = np.linspace(17.5, 19.5, 25), np.linspace(37.0, 39.0, 25)
     depth = np.array([0.5, 50.0, 200.0, 600.0, 1000.0])
     z, y, x = np.meshgrid(depth, lat, lon, indexing="ij")
-    # the straight line from (18.3, 38.1) to (18.75, 37.75), and some 15 km to either side of it
+    # the straight line from (18.3, 38.1) to (18.75, 37.75), and some 20 km to either side of it
     off = np.abs((x - 18.3) * 0.35 + (y - 38.1) * 0.45) / np.hypot(0.35, 0.45)
-    sea = off < 0.17
+    sea = off < 0.2
     fade = np.exp(-z / 400.0)
     dims = ("time", "depth", "latitude", "longitude")
     values = {

@@ -7,6 +7,7 @@ from helpers.small import command, roadmap
 
 from glider_stream import planner
 from glider_stream.base.errors import InputError
+from glider_stream.pilot.export import export_path
 from glider_stream.roadmap.store import write_roadmap
 
 OTHER = (-100.0, -100.0, 0.0)
@@ -44,7 +45,7 @@ def test_the_command_draws_several_files(two, tmp_path, capsys):
     write_roadmap(roadmap(), road)
     for name, path in two.items():
         files.append(tmp_path / f"{name}.json")
-        planner.export_path(path, files[-1])
+        export_path(path, files[-1])
     drawn = tmp_path / "routes.png"
     assert command(capsys, "plot", road, *files, "-o", drawn).code == 0
     assert drawn.stat().st_size > 10_000
