@@ -39,6 +39,13 @@ class OpenedRoadmap:
     `roadmap` is its data. `scenario`, `problem` and `planner()` are made when they are first needed, and
     kept. Points are given in the coordinates of the scenario's domain: x, y, z [m], z upward, or lon, lat
     [degrees], depth [m] where it is geographic; None for the scenario's own start or goal.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> road.query().found
+        True
+        >>> road.problem is road.problem
+        True
     """
 
     def __init__(self, roadmap: Roadmap, title: str = "") -> None:
@@ -98,6 +105,11 @@ class OpenedRoadmap:
         legs whose stops lie so near the straight line, where one glide does, and none where that breaks
         another rule. `surfacing` is a rule for how often to come up; the scenario's own if None. Exported
         windows last `window_hours`.
+
+        Examples:
+            >>> path = road.query((-190, 190, 0), (100, -100, -75), thin=20)
+            >>> len(path.legs), round(path.travel_time)
+            (3, 430)
         """
         for output in outputs:
             check_export(output)
@@ -107,26 +119,54 @@ class OpenedRoadmap:
         return path
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none."""
+        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none.
+
+        Examples:
+            >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
+            array([[430., 382.]])
+        """
         free = self.planner(Surfacing())
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
     def arrivals(self, start: Point | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot.
+
+        Examples:
+            >>> int((road.arrivals() < 300).sum())
+            18
+        """
         return self.planner(Surfacing()).arrivals(None if start is None else self._point(start))
 
     def trade_off(
         self, start: Point | None = None, goal: Point | None = None, *, surfacing: Surfacing | None = None
     ) -> TradeOff:
-        """The paths of one query that are best for some price of time against energy; all else as in `query`."""
+        """The paths of one query that are best for some price of time against energy; all else as in `query`.
+
+        Examples:
+            >>> energy = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
+            >>> [len(path.legs) for path in glider_stream.open(energy).trade_off().paths]
+            [4]
+        """
         return front(self.planner(surfacing), self._ends(start, goal))
 
     def card(self, path: Path) -> Card:
-        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
+        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+
+        Examples:
+            >>> print(road.card(road.query()))  # doctest: +ELLIPSIS
+            leg   hours  over ground ...
+            ...
+        """
         return card_of(path, self.problem)
 
     def score(self, route: str | File) -> Score:
-        """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in the roadmap's water."""
+        """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in the roadmap's water.
+
+        Examples:
+            >>> _ = road.query(outputs=["path.json"])
+            >>> road.score("path.json").flyable
+            True
+        """
         drawn = read_drawn(route)
         # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
         planner, domain = self.planner(Surfacing()), self.scenario.domain
@@ -152,6 +192,9 @@ class OpenedRoadmap:
         A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path
         by time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written
         where `output` says; one that ends in .html is a page to look around in, and no figure is returned.
+
+        Examples:
+            >>> figure = road.plot(road.query(), "route.png", depths=[0, 75])
         """
         from .plot.draw import check_drawing, draw_roadmap, draw_route
 
@@ -173,6 +216,10 @@ class OpenedRoadmap:
 
         `paths` are path files, which are called by their names without the ending, or paths by name. Without
         a `depth` the middle of the box is drawn. The figure is written where `output` says.
+
+        Examples:
+            >>> paths = {"near": road.query(goal=(0, 0, -150)), "far": road.query()}
+            >>> figure = road.plot_routes(paths, "routes.png", depth=75)
         """
         from .plot.draw import check_drawing, draw_routes
 
@@ -200,6 +247,12 @@ def open(roadmap: str | File | Roadmap | OpenedRoadmap) -> OpenedRoadmap:
     """Open a roadmap, from its file or as it was built, for any number of questions.
 
     InputError where the file is not a roadmap, newer, incomplete or damaged.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> print(road)  # doctest: +ELLIPSIS
+        Roadmap: 77 nodes, 929 edges
+        ...
     """
     if isinstance(roadmap, OpenedRoadmap):
         return roadmap

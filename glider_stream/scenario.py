@@ -82,7 +82,13 @@ class QueryPoints:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One block each; `text` is the resolved TOML."""
+    """One block each; `text` is the resolved TOML.
+
+    Examples:
+        >>> scenario = glider_stream.read_scenario("seed-box")
+        >>> scenario.query.start, scenario.sampler
+        ((-450.0, 450.0, 0.0), GridSampler(shape=(16, 16, 4)))
+    """
 
     domain: BoxDomain | GeographicDomain
     flow: AnalyticFlow | OceanFlow
@@ -199,7 +205,12 @@ class Scenario:
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package, by name."""
+    """The scenarios that come with the package, by name.
+
+    Examples:
+        >>> "seed-box" in glider_stream.shipped_scenarios()
+        True
+    """
     folder = Path(str(files("glider_stream"))) / "data"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -210,6 +221,11 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     `overrides` are section.key=value each. Where they choose another kind of a section, the keys of the old
     kind that the new one does not know are dropped, but for those overridden themselves. File names in the
     scenario are relative to its folder, in overrides to the working directory.
+
+    Examples:
+        >>> scenario = glider_stream.read_scenario("seed-box", ["steering.method=flow-map"])
+        >>> scenario.domain.z
+        (-300.0, 0.0)
     """
     path = Path(name)
     if not path.is_file() and str(name) in shipped_scenarios():

@@ -2,7 +2,15 @@
 
 
 class InputError(ValueError):
-    """Unusable input; the message is one sentence that names the value received and the cure."""
+    """Unusable input; the message is one sentence that names the value received and the cure.
+
+    Examples:
+        >>> try:
+        ...     glider_stream.read_scenario("seed-bx")
+        ... except glider_stream.InputError as error:
+        ...     print(error)  # doctest: +ELLIPSIS
+        the scenario seed-bx ...
+    """
 
 
 class Unwritable(InputError):

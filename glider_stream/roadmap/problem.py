@@ -21,6 +21,11 @@ class Problem:
     `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
     where known. `flow_words`, `glider_words` say what they are.
+
+    Examples:
+        >>> problem = glider_stream.read_scenario("small.toml").problem()
+        >>> problem.lo.tolist(), problem.departure
+        ([-200.0, -200.0, -150.0], 0.0)
     """
 
     evaluator: Evaluator

@@ -31,6 +31,13 @@ class Leg:
     `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
     Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
     trajectory, and `north` [rad], true north counter-clockwise from the frame's +y. `cost`: its own.
+
+    Examples:
+        >>> leg = road.query().legs[0]
+        >>> bool(leg.end[2] < leg.start[2]), leg.glide_angle < 0
+        (True, True)
+        >>> round(leg.compass, 1)
+        137.5
     """
 
     start: Array
@@ -86,6 +93,13 @@ class Path:
     `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, if that is known.
     `unthinned`: how many legs and seconds it had before it was thinned. `least_time` [s]: no path within the
     bound on energy that was asked for takes less.
+
+    Examples:
+        >>> path = road.query()
+        >>> path.found, len(path.legs), path.unit
+        (True, 4, 's')
+        >>> path.trajectory.shape[1]
+        4
     """
 
     start: Array

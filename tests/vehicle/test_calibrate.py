@@ -240,6 +240,7 @@ def test_dives_too_flat_for_the_vehicle_and_far_off_are_named(tmp_path):
         ("w,u\n0.1\n", "line 2 of dives.csv has 1 cells, and the header 2"),
         ("w,u,u\n0.1,0.2,0.2\n", "more than one column `u`"),
         ("w,u,vertical_speed\n0.1,0.2,0.1\n", "more than one column for `vertical`: w, vertical_speed"),
+        ("vertical,horizontal,w\n0.1,0.2,0.1\n", "more than one column for `vertical`: vertical, w"),
         ("w,pitch\n0.1,95\n", "pitch = '95' must lie between -90 and 90"),
         ("w,pitch\n-0.1,20\n-0.1,-20\n", "line 2 of dives.csv: w = -0.1 is below 0 in a climb as in a dive"),
         ("w,u,phase\n-0.1,0.2,dive\n0.1,0.2,dive\n", "line 3 of dives.csv: w = 0.1 has another sign"),

@@ -13,8 +13,24 @@ from ...base.errors import InputError
 from ...base.settings import require
 
 COLUMNS = {
-    "vertical": ("vertical_speed", "vertical_speed_mps", "mean_abs_vert_speed_mps", "vert_speed", "w", "w_mps"),
-    "horizontal": ("horizontal_speed", "horizontal_speed_mps", "mean_horz_speed_mps", "horz_speed", "u", "u_mps"),
+    "vertical": (
+        "vertical",
+        "vertical_speed",
+        "vertical_speed_mps",
+        "mean_abs_vert_speed_mps",
+        "vert_speed",
+        "w",
+        "w_mps",
+    ),
+    "horizontal": (
+        "horizontal",
+        "horizontal_speed",
+        "horizontal_speed_mps",
+        "mean_horz_speed_mps",
+        "horz_speed",
+        "u",
+        "u_mps",
+    ),
     "pitch": ("pitch", "pitch_deg", "mean_pitch", "mean_pitch_deg"),
     "glide_angle": ("glide_angle", "glide_angle_deg", "gamma", "gamma_deg"),
     "buoyancy": ("buoyancy", "buoyancy_cc", "vbd_cc", "net_volume_cc"),
