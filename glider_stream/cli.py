@@ -56,14 +56,14 @@ def cli() -> None:
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-@click.option("--shard", metavar="K/N", help="Build part K of N alone, for `merge`.")
-@click.option("--restart", is_flag=True, help="Forget what a stopped build has kept, and begin anew.")
+@click.option("--shard", metavar="K/N", help="Build only part K of N, for `merge`.")
+@click.option("--restart", is_flag=True, help="Discard what a stopped build has kept, and begin again.")
 @click.option(
-    "--from", "base", type=FILE, metavar="OLD", help="Take over what a new current cannot have changed."
+    "--from", "base", type=FILE, metavar="OLD", help="Reuse the legs that a new current cannot have changed."
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Evaluate on a Dask cluster; local:N for N processes here.")
 @click.option(
-    "--checkpoint", type=float, metavar="SECONDS", help="How often the disk must keep it; 30 if not given."
+    "--checkpoint", type=float, metavar="SECONDS", help="Seconds between writes to disk; 30 if not given."
 )
 def build(
     scenario: str,
@@ -78,7 +78,7 @@ def build(
 ) -> None:
     """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
 
-    What is found is kept beside the output until it is whole: the same command goes on where it was stopped.
+    Results are kept beside the output until it is complete: the same command continues a stopped build.
     """
     from . import planner
     from .base.progress import reporter
@@ -113,10 +113,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @cli.command()
 @ROADMAP
 @click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
-@click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
+@click.option("--goal", type=place, metavar="X,Y,Z", help="The goal, in the same form as --start.")
 @click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
 @click.option(
-    "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
+    "--most-energy", type=float, metavar="J", help="The fastest route within this energy; cost must be energy."
 )
 @click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
 @click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
@@ -125,7 +125,7 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
 @click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
-@click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
+@click.option("--trade-off", "front", is_flag=True, help="List the paths that are best for some price of time.")
 @JSON
 def query(
     roadmap: Path,
@@ -148,16 +148,16 @@ def query(
 
     free = most_yos is None and most_hours is None
     rule = None if free else Surfacing(most_yos, most_hours)
-    said: Any
+    answer: Any
     if front:
-        alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
-        if not alone:
+        compatible = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+        if not compatible:
             raise click.UsageError(
                 "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
                 "leave one of them out"
             )
         corners = open(roadmap).trade_off(start, goal, surfacing=rule)
-        said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+        answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
         for output in outputs:
             check_export(output)
@@ -166,11 +166,11 @@ def query(
         path = road.query(
             start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
         )
-        said, found = road.card(path) if as_card and path.found else path, path.found
+        answer, found = road.card(path) if as_card and path.found else path, path.found
     if as_json:
-        _write_json(said.as_dict())
+        _write_json(answer.as_dict())
     else:
-        click.echo(said, err=not found)
+        click.echo(answer, err=not found)
     if not found:
         sys.exit(1)
 
@@ -185,11 +185,11 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
     """Say what ROADMAP holds."""
     from . import planner
 
-    said = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
+    answer = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
     if as_json:
-        _write_json(said.as_dict())
+        _write_json(answer.as_dict())
     else:
-        click.echo(said)
+        click.echo(answer)
 
 
 @cli.command()
@@ -197,7 +197,7 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
 @click.option("--sample", type=int, default=200, show_default=True, help="Edges for DOP853; 0 for all.")
 @JSON
 def verify(roadmap: Path, sample: int, as_json: bool) -> None:
-    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if it is not what it says."""
+    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if a leg differs."""
     from . import planner
 
     verification = planner.verify(roadmap, sample)
@@ -264,7 +264,7 @@ def plot(
 def describe(
     currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
 ) -> None:
-    """Say what the current files CURRENTS hold, and what the planner takes for what."""
+    """Say what the current files CURRENTS hold, and how the planner reads them."""
     from . import planner
 
     description = planner.describe(currents, [(*place, None)[:4] for place in at], dict(names))
@@ -279,7 +279,7 @@ def describe(
 @click.argument("route", type=FILE)
 @JSON
 def score(roadmap: Path, route: Path, as_json: bool) -> None:
-    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails."""
+    """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails."""
     from . import planner
 
     found = planner.score(roadmap, route)
@@ -300,7 +300,7 @@ def score(roadmap: Path, route: Path, as_json: bool) -> None:
     multiple=True,
     type=key_and_value,
     metavar="WHAT=COLUMN",
-    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase, called otherwise.",
+    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase: its column.",
 )
 @click.option("-o", "--output", type=FILE, help="A TOML file for the [glider] section to write.")
 @JSON
@@ -310,7 +310,9 @@ def calibrate(
     """Fit buoyancy or drag of a vehicle, and its lift, to DIVES: a CSV file of what it flew."""
     from . import planner
 
-    found = planner.calibrate(dives, output, preset=preset, columns={name: str(own) for name, own in columns})
+    found = planner.calibrate(
+        dives, output, preset=preset, columns={name: str(column) for name, column in columns}
+    )
     if as_json:
         _write_json(found.as_dict())
     else:
@@ -320,7 +322,7 @@ def calibrate(
 @cli.command()
 @click.option("--runs", type=int, help="How often each figure is measured; 5 if not given.")
 @click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
-@click.option("--only", multiple=True, metavar="PART", help="Parts, or problems of the suite; see README.")
+@click.option("--only", multiple=True, metavar="PART", help="Only these parts, or problems of the suite.")
 @click.option("--suite", is_flag=True, help="Solve the named problems instead, by every method and baseline.")
 @click.option("--ompl", type=FILE, help="With --suite: a folder for logs that OMPL's tools read.")
 @click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
@@ -336,7 +338,7 @@ def bench(
     against: Path | None,
     output: Path | None,
 ) -> None:
-    """Measure what this machine does, or how good routes are; the full run must be alone on it."""
+    """Measure what this machine does, or how good routes are; nothing else may run meanwhile."""
     from . import planner
 
     if suite:
@@ -349,12 +351,12 @@ def bench(
             ompl=ompl,
             quick=quick,
             only=only,
-            progress=lambda said: click.echo(f"suite: {said}", err=True),
+            progress=lambda answer: click.echo(f"suite: {answer}", err=True),
         )
         click.echo(report)
         return
     if ompl is not None:
-        raise click.UsageError("--ompl goes with --suite alone; add that or leave it out")
+        raise click.UsageError("--ompl needs --suite; add it, or leave --ompl out")
     record, moved = planner.bench(
         output, against=against, runs=5 if runs is None else runs, quick=quick, only=only, ceiling=ceiling,
         progress=lambda figure: click.echo(f"bench: {figure}", err=True),

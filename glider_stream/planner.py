@@ -88,7 +88,7 @@ def build_part(
     base: str | File | Roadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> None:
-    """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; else as `build`.
+    """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; see `build` for the rest.
 
     Examples:
         >>> for shard in ("1/2", "2/2"):
@@ -145,7 +145,7 @@ def _resolved(scenario: str | File | Scenario, output: str | File | None, overri
 
 
 def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
-    """One roadmap of the parts that builds with `shard` wrote.
+    """Make one roadmap of parts that `build_part` wrote.
 
     Examples:
         >>> for shard in ("1/2", "2/2"):
@@ -159,7 +159,7 @@ def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
 
 
 def info(roadmap: AnyRoadmap) -> Roadmap:
-    """A roadmap from its file; printed, it says what it is.
+    """A roadmap from its file, which can be printed.
 
     Examples:
         >>> print(planner.info("small.h5"))  # doctest: +ELLIPSIS
@@ -170,7 +170,7 @@ def info(roadmap: AnyRoadmap) -> Roadmap:
 
 
 def differ(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
-    """What two roadmaps differ in; printed, it says so.
+    """The differences between two roadmaps, which can be printed.
 
     Examples:
         >>> fewer = planner.build("small.toml", overrides=["neighbours.k=10"])
@@ -190,7 +190,7 @@ def query(
     surfacing: Surfacing | None = None,
     window_hours: float = HOURS,
 ) -> Path:
-    """The cheapest path between two points, as `OpenedRoadmap.query` has it.
+    """The cheapest path between two points, see `OpenedRoadmap.query`.
 
     For several questions open the roadmap once: `glider_stream.open`.
 
@@ -218,7 +218,7 @@ def trade_off(
     goal: Point | None = None,
     surfacing: Surfacing | None = None,
 ) -> TradeOff:
-    """The paths of one query that are best for some price of time against energy; all else as in `query`.
+    """The paths of one query that are best for some price of time against energy; see `query`.
 
     Examples:
         >>> road = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
@@ -264,7 +264,7 @@ def verify(roadmap: str | File, sample: int = 200) -> "Verification":
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where there is none.
+    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where no path exists.
 
     Points are given in the coordinates of the scenario's domain; see `query`.
 
@@ -284,7 +284,7 @@ def plot(
     chart: bool = False,
     fronts: float | None = None,
 ) -> "Figure | None":
-    """Draw a path over its roadmap, or the roadmap where there is none, as `OpenedRoadmap.plot` has it.
+    """Draw a path over its roadmap, or the roadmap where there is none, see `OpenedRoadmap.plot`.
 
     Examples:
         >>> path = planner.query("small.h5")

@@ -1,4 +1,4 @@
-"""What can go wrong that is not a bug."""
+"""Errors that are not bugs."""
 
 
 class InputError(ValueError):
@@ -18,4 +18,4 @@ class Unwritable(InputError):
 
 
 class Stopped(KeyboardInterrupt):
-    """Work that was interrupted from the keyboard; the message says what is kept, and how to go on."""
+    """Work was interrupted from the keyboard; the message says what is kept, and how to continue."""

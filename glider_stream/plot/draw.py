@@ -40,8 +40,8 @@ def check_drawing(
     needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
     plain = not chart and not as_page and fronts is None
     require(path is not None or plain, f"{needs} needs a path, got none; give the file that `query -o` wrote")
-    one = path is not None or depths is None or len(depths) == 1
-    require(one, f"a roadmap is drawn at one depth; got {depths}")
+    single = path is not None or depths is None or len(depths) == 1
+    require(single, f"a roadmap is drawn at one depth; got {depths}")
 
 
 def check_water(problem: Problem, route: Path, name: str) -> None:

@@ -35,7 +35,7 @@ def known_until(flow: Flow, terrain: Terrain) -> float:
 
 
 def sample_bottom(terrain: Terrain, x: ArrayLike, y: ArrayLike, known: float = -math.inf) -> Array:
-    """Height of the seabed [m] at x, y [m], broadcast: 0 on land, -inf where there is none above `known` [m].
+    """Height of the seabed [m] at x, y [m], broadcast: 0 on land, -inf where no seabed lies above `known` [m].
 
     By halving between surface and DEEPEST, so water under an overhang counts as ground.
     """

@@ -73,29 +73,29 @@ class NeighbourLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """As Legs says: the most of some nodes, far apart in the order."""
+        """The most pairs that one of some nodes makes; these nodes lie far apart in the order."""
         some = np.linspace(0, len(self.position) - 1, SAMPLED).astype(np.int64)
         return max(1, *(len(self.neighbourhood.of(self.position[n])) for n in some))
 
     def of(self, source: Index) -> Found:
-        """As Legs says."""
+        """Pairs from the nodes `source` to their neighbours."""
         indptr, target = as_csr([self.neighbourhood.of(self.position[n]) for n in source])
         outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
         return Found(indptr, target, outcomes)
 
     def away(self, point: Array) -> Attached:
-        """As Legs says."""
+        """Pairs from a point (3,) [m] to its neighbours."""
         nodes = self.neighbourhood.of(point)
         position = np.vstack([self.position[nodes], point])
         here, others = len(nodes), np.arange(len(nodes))
         return Attached(nodes, self.evaluator.connect(position, self.departure, [here], [0, here], others))
 
     def towards(self, point: Array) -> Attached:
-        """As Legs says; by one fan backward in time where the method and the flow allow it."""
+        """Pairs from nodes to a point (3,) [m]; by one fan backward in time where method and flow allow it."""
         nodes = self.neighbourhood.of(point)
         if self.evaluator.flies_backward:
-            there, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
-            return Attached(nodes[there], outcomes)
+            found, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
+            return Attached(nodes[found], outcomes)
         return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
 
 
@@ -114,18 +114,18 @@ class ReachableLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """As Legs says."""
+        """Twice the limit; all nodes where no limit is set."""
         return 2 * self.limit if self.limit else len(self.position)
 
     def of(self, source: Index) -> Found:
-        """As Legs says."""
+        """Pairs from the nodes `source` to the nodes that they reach."""
         indptr, target, outcomes = self._fan.reach(self.position, self.departure, source, self.limit)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
             outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
         return Found(indptr, target, outcomes)
 
     def away(self, point: Array) -> Attached:
-        """As Legs says; all that are reached."""
+        """Pairs from a point (3,) [m] to all nodes that it reaches."""
         nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, False)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
             position, here = np.vstack([self.position[nodes], point]), len(nodes)
@@ -134,7 +134,7 @@ class ReachableLegs:
         return Attached(nodes, outcomes)
 
     def towards(self, point: Array) -> Attached:
-        """As Legs says; all that reach it."""
+        """Pairs to a point (3,) [m] from all nodes that reach it."""
         if not is_steady(self.evaluator.flow):
             nodes = np.flatnonzero(self.position[:, 2] != point[2])
             return _each_towards(self.evaluator, self.position, nodes, point, self.departure)

@@ -48,13 +48,13 @@ class Problem:
         if self.to_lonlat is not None and np.isfinite(point).all():
             shown = [*self.to_lonlat(point[None])[0], 0.0 - point[2]]
             deepest = f"domain, which ends at a depth of {-self.lo[2]:g} m"
-        said = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
-        require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
-        require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
-        require(bool(point[2] >= self.lo[2]), f"`{name}` = {said} lies below the {deepest}; move it up")
+        text = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
+        require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {text}")
+        require(point[2] <= 0, f"`{name}` = {text} lies above the surface; z is upward, a depth of 100 m is -100")
+        require(bool(point[2] >= self.lo[2]), f"`{name}` = {text} lies below the {deepest}; move it up")
         inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
         where = "outside the flow, on land or too near the seabed"
-        require(inside, f"`{name}` = {said} lies {where}; move it into open water")
+        require(inside, f"`{name}` = {text} lies {where}; move it into open water")
 
     def legs(self, position: Array) -> Legs:
         """How legs among these nodes (n, 3) [m] are found."""
