@@ -2,13 +2,15 @@
 
 import json
 import os
+import re
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .base.errors import InputError, Stopped
+from .base.errors import InputError, InputWarning, Stopped
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -29,17 +31,21 @@ def place_and_time(text: str) -> tuple[Any, ...]:
 
 
 def key_and_value(text: str) -> tuple[str, Any]:
-    """A key, and its value: a whole number, or a text."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip() or not value.strip():
+    """A key, and its value: a number, or a text."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE, such as units=cm/s")
-    return key.strip(), int(value) if value.strip().isdecimal() else value.strip()
+    if value.isdecimal():
+        return key, int(value)
+    return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
 def _write_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=1))
 
 
+TRACE = "GLIDER_STREAM_TRACE"
+"""Name of the variable of the environment that shows the trace of an error of this program."""
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
@@ -91,13 +97,17 @@ def build(
         "scheduler": scheduler,
         "base": base,
     }
+    empty = ""
     with reporter("build") as progress:
         if shard is not None:
             planner.build_part(scenario, output, shard, progress=progress, **run)
             done = f"part {shard} of a roadmap"
         else:
-            done = str(planner.build(scenario, output, progress=progress, **run))
+            road = planner.build(scenario, output, progress=progress, **run)
+            done, empty = str(road), planner.why_no_edges(road)
     click.echo(f"{done}\n  file:   {output}")
+    if empty:
+        click.echo(f"note: {empty}", err=True)
 
 
 @cli.command()
@@ -107,7 +117,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     """Make one roadmap of PARTS, which `build --shard` wrote."""
     from . import planner
 
-    click.echo(f"{planner.merge(parts, output)}\n  file:   {output}")
+    road = planner.merge(parts, output)
+    click.echo(f"{road}\n  file:   {output}")
+    if empty := planner.why_no_edges(road):
+        click.echo(f"note: {empty}", err=True)
 
 
 @cli.command()
@@ -125,6 +138,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
 @click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
+@click.option("--waypoints", type=int, metavar="N", help="The most waypoints of a goto list; 8 if not given.")
+@click.option(
+    "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
+)
 @click.option("--trade-off", "front", is_flag=True, help="List the paths that are best for some price of time.")
 @JSON
 def query(
@@ -138,6 +155,8 @@ def query(
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
+    waypoints: int | None,
+    arrival_radius: float | None,
     front: bool,
     as_json: bool,
 ) -> None:
@@ -149,12 +168,14 @@ def query(
     free = most_yos is None and most_hours is None
     rule = None if free else Surfacing(most_yos, most_hours)
     answer: Any
+    given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
+    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if front:
-        compatible = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+        compatible = not outputs and most_energy is None and thin is None and not asked and not as_card
         if not compatible:
             raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
-                "leave one of them out"
+                "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
+                "--waypoints and --arrival-radius; leave one of them out"
             )
         corners = open(roadmap).trade_off(start, goal, surfacing=rule)
         answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
@@ -162,10 +183,11 @@ def query(
         for output in outputs:
             check_export(output)
         road = open(roadmap)
-        asked: dict[str, Any] = {} if window_hours is None else {"window_hours": window_hours}
         path = road.query(
             start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
         )
+        for note in path.notes:
+            click.echo(f"note: {note}", err=True)
         answer, found = road.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(answer.as_dict())
@@ -276,18 +298,39 @@ def describe(
 
 @cli.command()
 @ROADMAP
-@click.argument("route", type=FILE)
+@click.argument("route", nargs=-1, required=True, type=FILE)
+@click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
 @JSON
-def score(roadmap: Path, route: Path, as_json: bool) -> None:
-    """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails."""
+def score(roadmap: Path, route: tuple[Path, ...], start: Any, as_json: bool) -> None:
+    """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails.
+
+    CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
+    """
     from . import planner
 
-    found = planner.score(roadmap, route)
+    found = planner.score(roadmap, route, start)
     if as_json:
         _write_json(found.as_dict())
     else:
         click.echo(found, err=not found.flyable)
     if not found.flyable:
+        sys.exit(1)
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--waypoints", type=int, default=8, show_default=True, help="Waypoints a goto list may hold.")
+@JSON
+def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
+    """Look for faults in FILES that vehicles fly: goto lists, yo files, targets; exit code 1 if there are any."""
+    from . import planner
+
+    looked = planner.lint(files, waypoints)
+    if as_json:
+        _write_json([one.as_dict() for one in looked])
+    else:
+        click.echo("\n".join(map(str, looked)))
+    if any(one.faults for one in looked):
         sys.exit(1)
 
 
@@ -351,7 +394,7 @@ def bench(
             ompl=ompl,
             quick=quick,
             only=only,
-            progress=lambda answer: click.echo(f"suite: {answer}", err=True),
+            progress=lambda message: click.echo(f"suite: {message}", err=True),
         )
         click.echo(report)
         return
@@ -367,9 +410,10 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
+    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input, 3 an error of this program."""
     try:
         _check_environment()
+        _show_warnings()
         cli(prog_name="glider-stream", standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
@@ -390,6 +434,29 @@ def main() -> None:
         stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
         click.echo(f"glider-stream: {stopped}", err=True)
         sys.exit(130)
+    except Exception as error:
+        if os.environ.get(TRACE):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        click.echo(
+            f"glider-stream: an error of this program, and not of your input: {what}; "
+            f"please report it, with what {TRACE}=1 in the environment shows",
+            err=True,
+        )
+        sys.exit(3)
+
+
+def _show_warnings() -> None:
+    """Warnings on input in one line, without the place in this program."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+        if issubclass(category, InputWarning):
+            click.echo(f"glider-stream: warning: {message}", err=True)
+        else:
+            usual(message, category, *rest, **named)
+
+    warnings.showwarning = show
 
 
 def _check_environment() -> None:

@@ -14,7 +14,10 @@ from .opened import OpenedRoadmap
 from .opened import open as open_roadmap
 from .pilot.card import Card
 from .pilot.export import check_export
+from .pilot.lint import Linted
+from .pilot.lint import lint as lint_file
 from .pilot.score import Score
+from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
@@ -189,6 +192,8 @@ def query(
     thin: float | None = None,
     surfacing: Surfacing | None = None,
     window_hours: float = HOURS,
+    most_waypoints: int = MOST_WAYPOINTS,
+    arrival_radius: float | None = None,
 ) -> Path:
     """The cheapest path between two points, see `OpenedRoadmap.query`.
 
@@ -209,6 +214,8 @@ def query(
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
+        most_waypoints=most_waypoints,
+        arrival_radius=arrival_radius,
     )
 
 
@@ -239,8 +246,8 @@ def card(roadmap: AnyRoadmap, path: Path) -> Card:
     return open_roadmap(roadmap).card(path)
 
 
-def score(roadmap: AnyRoadmap, route: str | File) -> Score:
-    r"""Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in a roadmap's water.
+def score(roadmap: AnyRoadmap, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
+    r"""Fly a drawn route, from one file or several, in a roadmap's water; see `OpenedRoadmap.score`.
 
     Examples:
         >>> _ = pathlib.Path("drawn.csv").write_text("x,y,z\n-190,190,0\n-100,100,-75\n0,0,-150\n")
@@ -248,7 +255,29 @@ def score(roadmap: AnyRoadmap, route: str | File) -> Score:
         >>> score.flyable, len(score.legs)
         (True, 2)
     """
-    return open_roadmap(roadmap).score(route)
+    return open_roadmap(roadmap).score(route, start)
+
+
+def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
+    r"""What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets.
+
+    Examples:
+        >>> _ = pathlib.Path("goto_l10.ma").write_text("behavior_name=goto_list\n")
+        >>> (linted,) = planner.lint(["goto_l10.ma"])
+        >>> len(linted.faults) > 0
+        True
+    """
+    return [lint_file(file, most_waypoints) for file in files]
+
+
+def why_no_edges(roadmap: AnyRoadmap) -> str:
+    """The reason, in a sentence, if a roadmap has no edge; empty if it has some.
+
+    Examples:
+        >>> planner.why_no_edges("small.h5")
+        ''
+    """
+    return open_roadmap(roadmap).why_no_edges()
 
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":

@@ -6,7 +6,7 @@ import pathlib
 
 import numpy as np
 import pytest
-from helpers.currents import write_ionian
+from helpers.ionian import write_ionian
 from helpers.small import SCENARIO, roadmap
 
 import glider_stream

@@ -13,7 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from helpers.currents import write_ionian
+from helpers.ionian import write_ionian
 from helpers.small import command
 
 import glider_stream

@@ -13,6 +13,10 @@ class InputError(ValueError):
     """
 
 
+class InputWarning(UserWarning):
+    """Input that can be used, though it may not say what was meant; the message is one sentence."""
+
+
 class Unwritable(InputError):
     """An output that cannot be written whole, as on a full disk."""
 

@@ -57,3 +57,19 @@ def check_links(path: str | Path) -> None:
                         inside,
                         f"the data of `{name}` in {path} lie in other files, which are not read: copy them in",
                     )
+
+
+def groups_of(path: str | Path) -> tuple[list[str], set[str]]:
+    """The names of all groups of a file, and of those with data of two dimensions or more; "" is the root."""
+    every: list[str] = []
+    grids: set[str] = set()
+
+    def look(name: str, item: object) -> None:
+        if isinstance(item, h5py.Group):
+            every.append(name)
+        elif isinstance(item, h5py.Dataset) and item.ndim >= 2:
+            grids.add(name.rpartition("/")[0])
+
+    with h5py.File(path, "r") as file:
+        file.visititems(look)
+    return every, grids

@@ -19,6 +19,7 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
 from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 from ..roadmap.shard import Shard
+from ..roadmap.step_error import StepSample
 from ..roadmap.store import read_part, writing
 from .journal import Journal
 
@@ -121,12 +122,15 @@ def _run(
     batch_pairs: int,
 ) -> None:
     nodes = np.arange(*shard.nodes(len(position)))
-    tally = Tally(len(nodes), used)
+    tally, sample = Tally(len(nodes), used), StepSample(len(position))
     old = _taken_over(job, nodes)
     if old is not None:
         tally.add(old)
+        sample.take(old)
     for edges in journal.records():
         tally.add(edges)
+        sample.take(edges)
+    made = sample.checked(made, problem, position, lambda some: job.finder(problem, position, some, batch_pairs))
     known = journal.done.copy()
     if old is not None:
         known[old.source] = True

@@ -1,6 +1,7 @@
 """A route as its pilot follows it: a chart with the coast and the fronts, and what happens when."""
 
 from collections.abc import Sequence
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,10 +12,10 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import Along, along
-from .canvas import GREY, INK, colours, frozen, new_figure, said_time, styled, time_unit
+from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
-from .seabed import known_until, sample_bottom
+from .seabed import sample_bottom
 from .water import Frame, checked_depths, frame_of
 
 if TYPE_CHECKING:
@@ -65,7 +66,8 @@ def plot_chart(
         clock = _Clock(unit, name, Normalize(0.0, float(rows[-1, 0]) / unit))
         text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         if path.departs is not None:
-            text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC"
+            arrives = path.departs + timedelta(seconds=path.travel_time)
+            text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
         figure = new_figure(14.0, 8.6, f"{title}: {text}" if title else f"Route: {text}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
@@ -74,7 +76,7 @@ def plot_chart(
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
-        when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+        when = said_when(is_steady(flow), problem.departure, problem.departs)
         every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
@@ -82,7 +84,7 @@ def plot_chart(
         look = {"location": "bottom", "aspect": 45, "pad": 0.01}
         left.colorbar(line, ax=ax, label=f"Time since departure ({name})", **look)
         panels = right.subplots(3, 1, sharex=True, height_ratios=(1.25, 1.0, 1.0))
-        _draw_depth(panels[0], flow, terrain, rows, clock)
+        _draw_depth(panels[0], terrain, rows, clock)
         steps = along(path)
         _draw_heading(panels[1], steps, clock)
         _draw_speeds(panels[2], steps, clock)
@@ -109,10 +111,9 @@ def _draw_route(ax: "Axes", frame: Frame, rows: Array, stops: Array, clock: _Clo
     return route
 
 
-def _draw_depth(ax: "Axes", flow: Flow, terrain: Terrain, rows: Array, clock: _Clock) -> None:
+def _draw_depth(ax: "Axes", terrain: Terrain, rows: Array, clock: _Clock) -> None:
     time, depth = rows[:, 0] / clock.unit, -rows[:, 3] + 0.0
-    known = known_until(flow, terrain)
-    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known)
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2])
     deepest, near = max(float(depth.max()), 1.0), float(seabed.min())
     shown = np.isfinite(seabed).any() and near < DEEP * deepest
     end = 1.12 * deepest
@@ -126,8 +127,8 @@ def _draw_depth(ax: "Axes", flow: Flow, terrain: Terrain, rows: Array, clock: _C
     ax.add_collection(_by_time(np.column_stack([time, depth]), rows[:, 0], clock, 2.0))
     ax.set(xlim=(time[0], time[-1]), ylim=(end, -0.05 * end), ylabel="Depth (m)")
     text = "over the seabed" if shown else "no seabed on the way"
-    if not shown and np.isfinite([near, known]).any():
-        text = f"the seabed lies at {min(near, -known):,.0f} m or deeper"
+    if not shown and np.isfinite(near):
+        text = f"the seabed lies at {near:,.0f} m or deeper"
     ax.set_title(f"(b) Depth, {text}")
 
 

@@ -101,13 +101,12 @@ def draw_routes(
     routes: Mapping[str, Path],
     output: str | File | None,
     depth: float | None,
-    title: str,
 ) -> "Figure":
     """Several routes by name, side by side."""
     for name, route in routes.items():
         check_water(problem, route, f"the path {name}")
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
-    figure = plot_routes(flow, terrain, problem, road.position, routes, depth, title)
+    figure = plot_routes(flow, terrain, problem, road.position, routes, depth)
     if output is not None:
         save_figure(figure, output)
     return figure

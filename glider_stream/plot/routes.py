@@ -31,7 +31,6 @@ def plot_routes(
     position: Array,
     paths: Mapping[str, "Path"],
     depth: float | None = None,
-    title: str = "",
 ) -> "Figure":
     """Draw two to four paths by name among the nodes `position` (n, 3) [m], over the current at a `depth` [m].
 
@@ -46,7 +45,7 @@ def plot_routes(
     frame = frame_of(problem, np.vstack([row[:, 1:] for row in rows.values()]))
     level = 0.5 * (frame.top + frame.bottom) if depth is None else float(checked_depths([depth], frame)[0])
     with styled():
-        figure = new_figure(13.0, 9.4, title or "Routes")
+        figure = new_figure(13.0, 9.4, "Routes side by side")
         grid = figure.add_gridspec(2, 2, height_ratios=(2.0, 1.0))
         space = figure.add_subplot(grid[0, 0], projection="3d")
         draw_space(space, terrain, frame, position)

@@ -1,32 +1,55 @@
-"""A current file as Copernicus Marine serves it, made here: what the documents' commands read."""
+"""Small current files: a current that is linear in everything, written as real files write it."""
 
 import numpy as np
 
+LON, LAT = np.arange(20.0, 21.01, 0.1), np.arange(60.0, 61.01, 0.1)
+DEPTH = np.array([0.5, 10.0, 30.0, 50.0, 70.0, 100.0])
+DOMAIN = (20.35, 20.65), (60.35, 60.65)
+EAST = {"standard_name": "eastward_sea_water_velocity", "units": "m s-1"}
+NORTH = {"standard_name": "northward_sea_water_velocity", "units": "m s-1"}
 
-def write_ionian(file):
-    """Currents about the shipped `ionian`: sea along its route alone, so that a roadmap of it is small."""
+
+def current(lon, lat, depth=0.0, hours=0.0):
+    """Toward east and north [m/s]; nowhere 0 in the box of these files."""
+    u = 0.3 + 0.1 * (lon - 20.5) - 0.1 * (lat - 60.5) - 0.001 * depth + 0.004 * hours
+    v = -0.2 + 0.1 * (lon - 20.5) + 0.1 * (lat - 60.5) + 0.0005 * depth - 0.003 * hours
+    return u, v
+
+
+def dataset(lon=LON, lat=LAT, depth=DEPTH, hours=None, names=("uo", "vo")):
+    """The current on axes (time, depth, lat, lon), of which time and depth may be None."""
     import xarray as xr
 
-    lon, lat = np.linspace(17.5, 19.5, 25), np.linspace(37.0, 39.0, 25)
-    depth = np.array([0.5, 50.0, 200.0, 600.0, 1000.0])
-    z, y, x = np.meshgrid(depth, lat, lon, indexing="ij")
-    # the straight line from (18.3, 38.1) to (18.75, 37.75), and some 20 km to either side of it
-    off = np.abs((x - 18.3) * 0.35 + (y - 38.1) * 0.45) / np.hypot(0.35, 0.45)
-    sea = off < 0.2
-    fade = np.exp(-z / 400.0)
-    dims = ("time", "depth", "latitude", "longitude")
-    values = {
-        "uo": (0.1 * fade, "eastward_sea_water_velocity"),
-        "vo": (-0.1 * fade * np.cos(3.0 * x), "northward_sea_water_velocity"),
+    axes = {"time": hours, "depth": depth, "lat": lat, "lon": lon}
+    axes = {name: np.asarray(axis, float) for name, axis in axes.items() if axis is not None}
+    at = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
+    parts = current(at["lon"], at["lat"], at.get("depth", 0.0), at.get("time", 0.0))
+    attrs = {
+        "time": {"units": "hours since 2024-11-20 00:00:00", "standard_name": "time"},
+        "depth": {"units": "m", "positive": "down", "standard_name": "depth"},
+        "lat": {"units": "degrees_north"},
+        "lon": {"units": "degrees_east"},
     }
-    data = {
-        name: (dims, np.where(sea, value, np.nan)[None], {"standard_name": standard, "units": "m s-1"})
-        for name, (value, standard) in values.items()
-    }
-    axes = {
-        "time": ("time", np.array(["2024-11-20T12:00:00"], "datetime64[ns]")),
-        "depth": ("depth", depth, {"units": "m", "positive": "down", "standard_name": "depth"}),
-        "latitude": ("latitude", lat, {"units": "degrees_north", "standard_name": "latitude"}),
-        "longitude": ("longitude", lon, {"units": "degrees_east", "standard_name": "longitude"}),
-    }
-    xr.Dataset(data, axes).to_netcdf(file, engine="h5netcdf")
+    return xr.Dataset(
+        {
+            name: (tuple(axes), part, dict(words))
+            for name, part, words in zip(names, parts, (EAST, NORTH), strict=True)
+        },
+        {name: (name, axis, attrs[name]) for name, axis in axes.items()},
+    )
+
+
+def both(data, change):
+    """The same change to both components."""
+    data = data.copy(deep=True)
+    for name in [name for name in data.data_vars if name in ("uo", "vo", "u", "v")]:
+        data[name] = change(data[name]).assign_attrs(data[name].attrs)
+    return data
+
+
+def written(folder, data, name="currents.nc", **more):
+    """A NetCDF file without fills but those that the data declare."""
+    for variable in data.variables.values():
+        variable.encoding.setdefault("_FillValue", None)
+    data.to_netcdf(folder / name, engine="h5netcdf", **more)
+    return folder / name

@@ -22,7 +22,7 @@ from glider_stream.water.ocean import (
     read_currents,
     sample,
 )
-from glider_stream.water.ocean.flow import bottoms, filled, lower_faces, slots
+from glider_stream.water.ocean.flow import closed_below, data_end, filled, slots
 from glider_stream.water.ocean.grid import MAP_ERROR, LonLatGrid, index_map
 
 xr = pytest.importorskip("xarray")
@@ -437,9 +437,9 @@ FRAME = LocalFrame.over(*DOMAIN[:2])
 def test_the_flow_of_a_domain(tmp_path):
     file = read_currents(written(tmp_path, dataset()))
     flow, seabed = ocean_flow(file, FRAME, *DOMAIN, "2023-02-27T03:00:00Z")
-    assert (flow.t_lo, flow.t_hi) == (-3 * 3600, 21 * 3600)
+    assert (flow.extent.t_lo, flow.extent.t_hi) == (-3 * 3600, 21 * 3600)
     assert flow.values.shape[2:4] == (10, 13)
-    assert flow.length_scale == pytest.approx(5500, rel=0.02)
+    assert flow.extent.length_scale == pytest.approx(5500, rel=0.02)
     rng = np.random.default_rng(1)
     for lon, lat, depth, hours in rng.uniform((20.4, 60.15, 0.5, 0), (21.1, 60.65, 195, 24), (50, 4)):
         x, y = (float(part) for part in FRAME.to_local(lon, lat))
@@ -447,12 +447,12 @@ def test_the_flow_of_a_domain(tmp_path):
         turn = float(FRAME.convergence(lon, lat))
         east, north = u * math.cos(turn) + v * math.sin(turn), v * math.cos(turn) - u * math.sin(turn)
         assert (east, north) == pytest.approx(current(lon, lat, depth, hours), abs=1e-4)
-        assert math.hypot(u, v) <= flow.max_speed
+        assert math.hypot(u, v) <= flow.extent.max_speed
         assert contains(flow, x, y, 0.0)
         assert allowed(seabed, x, y, -depth)
     x, y = (float(part) for part in FRAME.to_local(20.1, 60.4))
     assert not contains(flow, x, y, 0.0)
-    # the last level's cell reaches as far down as up: 200 + 60 m
+    # data hold half a level's spacing beyond the last one: 200 + 60 m
     assert allowed(seabed, 0.0, 0.0, -259.9)
     assert not allowed(seabed, 0.0, 0.0, -260.1)
 
@@ -495,7 +495,7 @@ def test_a_single_level_and_a_single_time_are_doubled(tmp_path):
     file = read_currents(written(tmp_path, dataset().isel(depth=[0], time=[0])))
     flow, _ = ocean_flow(file, FRAME, *DOMAIN[:2], (0.0, 0.5))
     assert flow.values.shape[:2] == (2, 2)
-    assert (flow.t_lo, flow.t_hi) == (-math.inf, math.inf)
+    assert (flow.extent.t_lo, flow.extent.t_hi) == (-math.inf, math.inf)
     assert velocity(flow, 0.0, 0.0, -0.3, 1e6) == velocity(flow, 0.0, 0.0, 0.0, -5.0)
 
 
@@ -540,11 +540,15 @@ def test_dry_cells_take_from_wet_neighbours_then_from_above():
     assert (filled(values)[1, 3:] == 0.5).all()
 
 
-def test_bottoms_are_cell_faces():
-    faces = lower_faces(np.array([1.0, 3.0, 9.0]))
-    assert faces.tolist() == [2.0, 6.0, 12.0]
-    wet = np.array([[1, 1, 1, 0], [0, 1, 1, 0], [0, 0, 1, 1]], dtype=bool)
-    assert bottoms(wet, faces).tolist() == [-2.0, -6.0, -12.0, 0.0]
+def test_columns_are_closed_where_their_data_end():
+    depth, unknown = np.array([1.0, 3.0, 9.0]), np.full(5, np.inf)
+    assert data_end(depth) == 12.0
+    wet = np.array([[1, 1, 1, 0, 1], [0, 1, 1, 0, 0], [0, 0, 1, 1, 0]], dtype=bool)
+    # the deepest level with data, half a level beyond the last, and nothing where the top level is dry
+    assert closed_below(wet, depth, depth, unknown) == pytest.approx([-1.01, -3.01, -12.0, 0.0, -1.01])
+    # where the seabed lies above the next level, the data go on to it
+    seabed = np.array([2.5, 8.9, np.inf, np.inf, 1.0])
+    assert closed_below(wet, depth, depth, seabed) == pytest.approx([-np.inf, -np.inf, -12.0, 0.0, -np.inf])
 
 
 def test_grid_flow_from_arrays():
@@ -620,6 +624,12 @@ def test_describe_says_what_was_taken_and_read(tmp_path):
         describe(path, at=[(*PLACE[:3], None)])
 
 
+def file_words(path):
+    """What `describe` says was assumed, as a roadmap keeps it."""
+    took = describe(path).as_dict()["took"]
+    return {f"{key}: {took[key]}" for key in ("bottom", "land", "levels", "stamps")}
+
+
 def test_the_scenario_block(tmp_path):
     path = written(tmp_path, dataset())
     flow, bottom, words = OceanFlow((str(path),), epoch=str(START)).waters(FRAME, *DOMAIN)
@@ -627,7 +637,9 @@ def test_the_scenario_block(tmp_path):
     assert x == pytest.approx(current(FRAME.lon, FRAME.lat, 47.0, 15.0), abs=TOLERANCE)
     assert bottom.height.shape == bottom.grid.shape
     assert (bottom.height == -260.0).all()
+    assert np.isneginf(bottom.ground).all()
     assert "currents.nc" in words
+    assert file_words(path) <= set(words.split("; "))
 
 
 @real
@@ -674,6 +686,6 @@ def test_a_flow_of_a_real_coast():
     frame = LocalFrame.over(lon, lat)
     flow, seabed = ocean_flow(read_currents(GALICIA), frame, lon, lat, depth, "2025-01-02T06:00")
     assert np.isfinite(flow.values).all()
-    assert flow.max_speed < 0.3
+    assert flow.extent.max_speed < 0.3
     assert 0 < (seabed.bottom == 0).mean() < 0.6
     assert seabed.bottom.min() > -220
