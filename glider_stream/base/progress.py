@@ -29,11 +29,11 @@ def reporter(what: str) -> Iterator[Callable[[Any], None]]:
     from rich.progress import BarColumn, Progress, TextColumn
 
     with Progress(
-        TextColumn(what), BarColumn(), TextColumn("{task.fields[said]}"), console=Console(stderr=True)
+        TextColumn(what), BarColumn(), TextColumn("{task.fields[state]}"), console=Console(stderr=True)
     ) as bar:
-        task = bar.add_task(what, said="compiling")
+        task = bar.add_task(what, state="compiling")
 
         def update(progress: Any) -> None:
-            bar.update(task, completed=progress.done, total=progress.total, said=str(progress))
+            bar.update(task, completed=progress.done, total=progress.total, state=str(progress))
 
         yield update

@@ -108,6 +108,14 @@ class Roadmap:
     `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
     (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
     `node_counts` (n, statuses) those of each node, where the file has them.
+
+    Examples:
+        >>> roadmap = glider_stream.read_roadmap("small.h5")
+        >>> roadmap.position.shape, roadmap.target.size
+        ((77, 3), 929)
+        >>> first = slice(roadmap.indptr[0], roadmap.indptr[1])
+        >>> len(roadmap.target[first]) == len(roadmap.time[first])
+        True
     """
 
     position: Array

@@ -109,9 +109,7 @@ class LabelSearch:
         self.is_goal[goals] = True
         self.inflection = cost.inflection(places[:, 2])
         self.per_second, self.per_leg = cost.kernel()
-        self.priced = self.inflection is not None and (
-            aim.by_cost or aim.front or math.isfinite(aim.cost_below)
-        )
+        self.priced = self.inflection is not None and (aim.by_cost or aim.front or math.isfinite(aim.cost_below))
         self.left = self.cost_left = np.zeros(len(places))
         if goals.size:
             self.left, self.cost_left = bound.remaining(goals, cost)
