@@ -1,6 +1,7 @@
 """The roadmap: nodes, the legs between them, and how it is built."""
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -71,6 +72,44 @@ class Edges:
         edges = np.repeat(chosen, self.degree)
         kept = self.source[chosen], self.degree[chosen], self.target[edges], self.values[edges]
         return Edges(*kept, self.counts[chosen])
+
+    def before(self, node: int) -> tuple["Edges", "Edges"]:
+        """Those of the nodes before `node`, and those from it on, without a copy."""
+        row = int(np.searchsorted(self.source, node))
+        edge = int(self.degree[:row].sum())
+        parts = []
+        for rows, edges in ((slice(row), slice(edge)), (slice(row, None), slice(edge, None))):
+            arrays = self.source[rows], self.degree[rows], self.target[edges], self.values[edges]
+            parts.append(Edges(*arrays, self.counts[rows]))
+        return parts[0], parts[1]
+
+    def digest(self) -> str:
+        """A digest of all that they say; "" where there is no node."""
+        if self.source.size == 0:
+            return ""
+        text = hashlib.sha256()
+        arrays = self.source, self.degree, self.target, self.values, self.counts
+        for array, (_, kind) in zip(arrays, EMPTY, strict=True):
+            text.update(np.ascontiguousarray(array, kind).tobytes())
+        return text.hexdigest()
+
+
+def by_node(parts: Iterable[Edges]) -> Iterator[Edges]:
+    """The edges of parts, which come by their first nodes, in the order of all nodes.
+
+    Parts may interleave, as a cluster finds them; no more than those that overlap are held.
+    """
+    waiting: list[Edges] = []
+    for part in parts:
+        if part.source.size == 0:
+            continue
+        split = [one.before(int(part.source[0])) for one in waiting]
+        ready = [before for before, _ in split if before.source.size]
+        if ready:
+            yield in_order(ready)
+        waiting = [*(rest for _, rest in split if rest.source.size), part]
+    if waiting:
+        yield in_order(waiting)
 
 
 def in_order(parts: Sequence[Edges]) -> Edges:

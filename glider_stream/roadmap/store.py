@@ -1,6 +1,7 @@
 """The roadmap file: HDF5, format version 1. Nothing else knows h5py."""
 
 import contextlib
+import hashlib
 import io
 import os
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
+from ..base.errors import InputError, Unwritable
 from ..base.output import replacing
 from ..base.settings import require
 from ..base.untrusted import check_claim, check_links
@@ -27,6 +28,8 @@ PART_FORMAT = "glider-stream/roadmap-part"
 VERSION = 1
 CHUNK = 32768
 """Edges in a chunk of a dataset, 256 kB: one is checked and cached whole."""
+CHECKED = 16 * CHUNK
+"""Rows that are read back at once when a file is checked."""
 
 _DESCRIBED = {
     "nodes/position": ("f8", "m", "node position: x east, y north, z upward from the surface"),
@@ -90,6 +93,8 @@ class RoadmapWriter:
         self._waiting: list[Edges] = []
         self._degree: list[AnyArray] = []
         self._counts: list[AnyArray] = []
+        self._next, self._last = shard.nodes(len(position))
+        self.digests: dict[str, Any] = {}
         file.attrs["format"] = FORMAT if shard.whole else PART_FORMAT
         if not shard.whole:
             file.attrs["shard"] = str(shard)
@@ -101,7 +106,14 @@ class RoadmapWriter:
             self._put("nodes/lonlat", lonlat)
 
     def append(self, edges: Edges) -> None:
-        """Take the edges of the next nodes."""
+        """Take the edges of the next nodes; RuntimeError if they are others, as only a bug hands over."""
+        follows = np.array_equal(edges.source, np.arange(self._next, self._next + edges.source.size))
+        whole = edges.degree.sum() == edges.target.size == len(edges.values)
+        if not follows or not whole:
+            raise RuntimeError(
+                f"edges of nodes from {self._next:,} on are missing, or stand twice; no file is made"
+            )
+        self._next += edges.source.size
         self._degree.append(edges.degree)
         self._counts.append(edges.counts)
         self._waiting.append(edges)
@@ -111,6 +123,8 @@ class RoadmapWriter:
     def finish(self, tally: Tally) -> None:
         """Write what is known after the edges are, and declare the file complete."""
         self._flush()
+        if self._next != self._last:
+            raise RuntimeError(f"the edges of node {self._next:,} are missing; no file is made")
         degree = np.concatenate([np.zeros(1, np.int64), *self._degree])
         self._put("edges/indptr", np.cumsum(degree))
         by_name = tally.by_name()
@@ -137,6 +151,8 @@ class RoadmapWriter:
     def _put(self, name: str, rows: AnyArray) -> None:
         """Append rows to a dataset, which is made if there is none."""
         kind, unit, words = _DESCRIBED[name]
+        rows = np.ascontiguousarray(rows, kind)
+        self.digests.setdefault(name, hashlib.blake2b()).update(rows.tobytes())
         if name in self._file:
             dataset = self._file[name]
             before = len(dataset)
@@ -146,7 +162,7 @@ class RoadmapWriter:
         # checksums need chunks, and chunks an element
         chunks = (max(1, min(CHUNK, len(rows))), *rows.shape[1:])
         more = {"maxshape": (None, *rows.shape[1:]), "chunks": chunks, "fletcher32": True}
-        dataset = self._file.create_dataset(name, data=np.asarray(rows, kind), **more)
+        dataset = self._file.create_dataset(name, data=rows, **more)
         dataset.attrs["units"] = unit
         dataset.attrs["long_name"] = words
 
@@ -158,8 +174,21 @@ def writing(
     """A roadmap file in the making; at `path` when the block ends well, and not at all else."""
     with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
         with h5py.File(disk, "w") as file:
-            yield RoadmapWriter(disk, file, position, lonlat, made, shard)
+            writer = RoadmapWriter(disk, file, position, lonlat, made, shard)
+            yield writer
         disk.check()
+        _check_written(temporary, Path(path), writer.digests)
+
+
+def _check_written(temporary: Path, path: Path, digests: dict[str, Any]) -> None:
+    """Unwritable unless a finished file reads back as it was written, to the bit: before it replaces anything."""
+    with h5py.File(temporary, "r") as file:
+        for name, digest in digests.items():
+            dataset, read = file[name], hashlib.blake2b()
+            for first in range(0, len(dataset), CHECKED):
+                read.update(dataset[first : first + CHECKED].tobytes())
+            if read.digest() != digest.digest():
+                raise Unwritable(f"the output {path} cannot be written whole: its {name} reads back otherwise")
 
 
 def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
