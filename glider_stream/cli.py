@@ -43,6 +43,13 @@ def _write_json(value: Any) -> None:
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
+ELSEWHERE = click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="SECTION.KEY=FILE",
+    help="Where a file of ROADMAP's scenario is now, such as flow.file=currents.nc.",
+)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
@@ -107,6 +114,7 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 
 @cli.command()
 @ROADMAP
+@ELSEWHERE
 @click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
 @click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
 @click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
@@ -124,6 +132,7 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @JSON
 def query(
     roadmap: Path,
+    overrides: tuple[str, ...],
     start: Any,
     goal: Any,
     outputs: tuple[Path, ...],
@@ -139,6 +148,7 @@ def query(
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
     from . import planner
 
+    road = planner.info(roadmap, overrides)
     rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
     if front:
         alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
@@ -148,12 +158,12 @@ def query(
                 "leave one of them out"
             )
         said: Any
-        corners = planner.trade_off(roadmap, start, goal)
+        corners = planner.trade_off(road, start, goal)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
         hours = {} if window_hours is None else {"window_hours": window_hours}
-        path = planner.query(roadmap, start, goal, outputs, most_energy, thin, rule or None, **hours)
-        said, found = planner.card(roadmap, path) if as_card and path.found else path, path.found
+        path = planner.query(road, start, goal, outputs, most_energy, thin, rule or None, **hours)
+        said, found = planner.card(road, path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:
@@ -181,13 +191,14 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
 
 @cli.command()
 @ROADMAP
+@ELSEWHERE
 @click.option("--sample", type=int, default=200, show_default=True, help="Edges for DOP853; 0 for all.")
 @JSON
-def verify(roadmap: Path, sample: int, as_json: bool) -> None:
+def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool) -> None:
     """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if it is not what it says."""
     from . import planner
 
-    verification = planner.verify(roadmap, sample)
+    verification = planner.verify(roadmap, sample, overrides=overrides)
     if as_json:
         _write_json(verification.as_dict())
     else:
@@ -198,18 +209,25 @@ def verify(roadmap: Path, sample: int, as_json: bool) -> None:
 
 @cli.command()
 @ROADMAP
+@ELSEWHERE
 @click.argument("path", required=False, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
 @click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
 @click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
 @click.option("--fronts", type=float, metavar="HOURS", help="As --chart, with what is reached every HOURS.")
 def plot(
-    roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], chart: bool, fronts: float | None
+    roadmap: Path,
+    overrides: tuple[str, ...],
+    path: Path | None,
+    output: Path,
+    depths: tuple[float, ...],
+    chart: bool,
+    fronts: float | None,
 ) -> None:
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts)
+    planner.plot(planner.info(roadmap, overrides), path, output, depths or None, chart=chart, fronts=fronts)
     click.echo(output)
 
 
@@ -246,13 +264,14 @@ def describe(
 
 @cli.command()
 @ROADMAP
+@ELSEWHERE
 @click.argument("route", type=FILE)
 @JSON
-def score(roadmap: Path, route: Path, as_json: bool) -> None:
+def score(roadmap: Path, overrides: tuple[str, ...], route: Path, as_json: bool) -> None:
     """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails."""
     from . import planner
 
-    found = planner.score(roadmap, route)
+    found = planner.score(planner.info(roadmap, overrides), route)
     if as_json:
         _write_json(found.as_dict())
     else:

@@ -26,7 +26,7 @@ from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
-from .scenario import Scenario, read_scenario, scenario_from_text
+from .scenario import Scenario, read_scenario, scenario_of
 from .search.path import SURFACE, Path, load_path
 from .search.query import Planner
 from .search.surfacing import Surfacing, SurfacingPlanner
@@ -97,7 +97,7 @@ def _build(
         from .jobs.reuse import untouched
 
         road = info(older)
-        before = scenario_from_text(road.provenance.scenario).problem()
+        before = scenario_of(road).problem()
         check_unchanged(road, before)
         job["base"] = road, untouched(road, before, problem)
     if address is None:
@@ -128,9 +128,14 @@ def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
     return read_roadmap(output)
 
 
-def info(roadmap: str | File | Roadmap) -> Roadmap:
-    """A roadmap from its file; printed, it says what it is."""
-    return roadmap if isinstance(roadmap, Roadmap) else read_roadmap(roadmap)
+def info(roadmap: str | File | Roadmap, overrides: Sequence[str] = ()) -> Roadmap:
+    """A roadmap from its file; printed, it says what it is.
+
+    `overrides`, such as "flow.file=currents.nc", say where a file is now that its scenario reads; one that lies
+    beside the roadmap is found without. All functions that take a roadmap take what this returns.
+    """
+    road = roadmap if isinstance(roadmap, Roadmap) else read_roadmap(roadmap)
+    return replace(road, elsewhere=(*road.elsewhere, *overrides)) if overrides else road
 
 
 def differ(first: str | File | Roadmap, second: str | File | Roadmap) -> Difference:
@@ -204,7 +209,7 @@ def _front(search: Planner, ends: tuple[Array | None, Array | None]) -> TradeOff
 def card(roadmap: str | File | Roadmap, path: Path) -> Card:
     """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
     road = info(roadmap)
-    return card_of(path, scenario_from_text(road.provenance.scenario).problem())
+    return card_of(path, scenario_of(road).problem())
 
 
 def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
@@ -212,7 +217,7 @@ def score(roadmap: str | File | Roadmap, route: str | File) -> Score:
     drawn = read_drawn(route)
     # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
     search, _ = _search(roadmap, None, None, Surfacing())
-    domain = scenario_from_text(search.roadmap.provenance.scenario).domain
+    domain = scenario_of(search.roadmap).domain
     on_globe = isinstance(domain, GeographicDomain)
     cure = "and the roadmap is in metres; give x, y, z in a CSV file"
     require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
@@ -226,7 +231,7 @@ def _search(
     roadmap: str | File | Roadmap, start: Point | None, goal: Point | None, rule: Surfacing | None = None
 ) -> tuple[Planner, tuple[Array | None, Array | None]]:
     road = info(roadmap)
-    scenario = scenario_from_text(road.provenance.scenario)
+    scenario = scenario_of(road)
     ends = [None if end is None else scenario.domain.point(end) for end in (start, goal)]
     if rule is None and scenario.query is not None:
         rule = Surfacing(scenario.query.most_yos, scenario.query.most_hours)
@@ -236,11 +241,14 @@ def _search(
     return search, (ends[0], ends[1])
 
 
-def verify(roadmap: str | File, sample: int = 200) -> "Verification":
-    """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too."""
+def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":
+    """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too.
+
+    `overrides` as `info` has them.
+    """
     from .roadmap.verify import verify
 
-    return verify(roadmap, lambda text: scenario_from_text(text).problem(), sample)
+    return verify(roadmap, lambda road: scenario_of(info(road, overrides)).problem(), sample)
 
 
 def table(roadmap: str | File | Roadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
@@ -249,7 +257,7 @@ def table(roadmap: str | File | Roadmap, starts: Sequence[Point], goals: Sequenc
     Points are given in the coordinates of the scenario's domain; see `query`.
     """
     road = info(roadmap)
-    scenario = scenario_from_text(road.provenance.scenario)
+    scenario = scenario_of(road)
     ends = ([scenario.domain.point(end) for end in some] for some in (starts, goals))
     return Planner(road, scenario.problem()).table(*ends)
 
@@ -288,9 +296,9 @@ def plot(
     chart = chart or as_page or fronts is not None
     require(path is not None or not chart, f"{needs} needs a path, got none; give the file that `query -o` wrote")
     road = info(roadmap)
-    title = "" if isinstance(roadmap, Roadmap) else File(roadmap).stem
+    title = "" if road.file is None else road.file.stem
     route = path if path is None or isinstance(path, Path) else load_path(path)
-    scenario = scenario_from_text(road.provenance.scenario)
+    scenario = scenario_of(road)
     problem = scenario.problem()
     check_unchanged(road, problem)
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain

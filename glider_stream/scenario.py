@@ -18,9 +18,11 @@ from .base.toml import to_toml
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
 from .roadmap.evaluator import Evaluator
+from .roadmap.inputs import KEYS, located, names_of, renamed
 from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
+from .roadmap.roadmap import Roadmap
 from .roadmap.steering import METHODS, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
@@ -50,7 +52,7 @@ OPTIONAL = ("terrain", "query")
 
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
-FILES = {"file", "bathymetry", "keep_out"}
+FILES = {key for keys in KEYS.values() for key in keys}
 """Keys whose values name files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
@@ -235,6 +237,27 @@ def scenario_from_text(text: str) -> Scenario:
         return scenario_from_table(tomllib.loads(text), Path())
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"the roadmap's scenario is not valid TOML: {error}") from None
+
+
+def scenario_of(road: Roadmap) -> Scenario:
+    """The scenario that a roadmap carries, its files found again where they or the roadmap have moved."""
+    text = road.provenance.scenario
+    try:
+        table: dict[str, Any] = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return scenario_from_text(text)
+    names, beside = names_of(table), Path() if road.file is None else road.file.absolute().parent
+    given: dict[str, tuple[str, ...]] = {}
+    for override in road.elsewhere:
+        place = override.partition("=")[0].strip()
+        choices = " or ".join(names) or "which has none"
+        require(place in names, f"`--set` names a file of the roadmap's scenario, {choices}; got {override!r}")
+        _set(table, override)
+        section, key = place.split(".")
+        table[section] |= _located({key: table[section][key]}, Path())
+        given[place] = names_of(table)[place]
+    asked = {place: some for place, some in names.items() if place not in given}
+    return scenario_from_table(renamed(table, located(asked, road.provenance.inputs, beside)), Path())
 
 
 def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:

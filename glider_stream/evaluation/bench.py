@@ -29,7 +29,7 @@ from ..kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
 from ..kernels.motion import LANES, X, Y
 from ..roadmap.builder import find_edges, node_positions, warm_up
 from ..roadmap.store import read_roadmap
-from ..scenario import read_scenario, scenario_from_text
+from ..scenario import read_scenario, scenario_of
 from ..search.query import Planner
 from ..water.sampled import sample_flow
 
@@ -279,7 +279,7 @@ def sizes(runs: int, quick: bool) -> Iterator[Figure]:
             first = tuple(_process("query", file)[0] for _ in range(5))
             yield Figure(f"{name}: first query, whole process", "s", first, False)
             began = time.perf_counter()
-            problem = scenario_from_text(road.provenance.scenario).problem()
+            problem = scenario_of(road).problem()
             sampled = time.perf_counter() - began
             yield Figure(f"{name}: of it, sampling the flow", "s", (sampled,), False)
             planner, rng, half = Planner(road, problem), np.random.default_rng(1), 0.9 * problem.hi[0]

@@ -75,7 +75,7 @@ def build_file(
     with locked(target):
         remove_abandoned(target)
         position = node_positions(problem)
-        made = provenance_of(problem, position)
+        made = provenance_of(problem, position, target.parent)
         shard = job.shard or Shard(1, 1)
         nodes = np.arange(*shard.nodes(len(position)))
         old = _taken_over(job, nodes)

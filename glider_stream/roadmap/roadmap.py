@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
 from ..kernels.edges import Status
+from .inputs import settings_sha256
 
 EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
 
@@ -33,18 +35,18 @@ class Provenance:
     libraries: str = ""
     machine: str = ""
     cost_unit: str = "s"
+    inputs: str = ""
 
     def identity(self) -> dict[str, str]:
-        """What two roadmaps, or parts of one, must share to hold the same edges."""
+        """What two roadmaps, or parts of one, must share to hold the same edges: content, and no file's name."""
         keys = (
-            "scenario_sha256",
             "nodes_sha256",
             "flow_sha256",
             "terrain_sha256",
             "glider_sha256",
             "kernel_digest",
         )
-        return {key: getattr(self, key) for key in keys}
+        return {"scenario_sha256": settings_sha256(self.scenario)} | {key: getattr(self, key) for key in keys}
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,8 @@ class Roadmap:
 
     `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
     (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
-    `node_counts` (n, statuses) those of each node, where the file has them.
+    `node_counts` (n, statuses) those of each node, where the file has them. `file`: where it was read from;
+    `elsewhere`: section.key=FILE for each file of its scenario that the user says is now there.
     """
 
     position: Array
@@ -163,6 +166,8 @@ class Roadmap:
     threads: int
     lonlat: Array | None = None
     node_counts: NDArray[np.int32] | None = None
+    file: Path | None = None
+    elsewhere: tuple[str, ...] = ()
 
     @property
     def evaluated(self) -> int:

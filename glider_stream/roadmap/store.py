@@ -216,17 +216,19 @@ def read_roadmap(path: str | Path) -> Roadmap:
         counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
         counted = min(counts.values()) >= 0
         require(counted, f"the roadmap {path} is damaged: a count of its pairs makes no sense; build it again")
+        values: dict[str, Any] = {name: arrays[f"edges/{name}"] for name in EDGE_FIELDS}
         return Roadmap(
             position=arrays["nodes/position"],
             indptr=arrays["edges/indptr"],
             target=arrays["edges/target"],
-            **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
+            **values,
             counts=counts,
             provenance=_provenance(file),
             wall_s=wall,
             threads=used,
             lonlat=arrays.get("nodes/lonlat"),
             node_counts=arrays.get("pairs/by_node"),
+            file=path,
         )
     raise AssertionError  # _reading raises
 
