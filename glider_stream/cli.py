@@ -9,6 +9,8 @@ from typing import Any
 import click
 
 from .base.errors import InputError, Stopped
+from .base.interrupt import STOPPED, stoppable
+from .base.terminal import plain, say, silence
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -37,7 +39,7 @@ def key_and_value(text: str) -> tuple[str, Any]:
 
 
 def _write_json(value: Any) -> None:
-    click.echo(json.dumps(value, indent=1))
+    say(json.dumps(value, indent=1))
 
 
 FILE = click.Path(path_type=Path)
@@ -99,7 +101,7 @@ def build(
             done = f"part {shard} of a roadmap"
         else:
             done = str(planner.build(scenario, output, progress=progress, **run))
-    click.echo(f"{done}\n  file:   {output}")
+    say(f"{done}\n  file:   {output}")
 
 
 @cli.command()
@@ -109,7 +111,7 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     """Make one roadmap of PARTS, which `build --shard` wrote."""
     from . import planner
 
-    click.echo(f"{planner.merge(parts, output)}\n  file:   {output}")
+    say(f"{planner.merge(parts, output)}\n  file:   {output}")
 
 
 @cli.command()
@@ -167,7 +169,7 @@ def query(
     if as_json:
         _write_json(said.as_dict())
     else:
-        click.echo(said, err=not found)
+        say(said, error=not found)
     if not found:
         sys.exit(1)
 
@@ -186,7 +188,7 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
     if as_json:
         _write_json(said.as_dict())
     else:
-        click.echo(said)
+        say(said)
 
 
 @cli.command()
@@ -202,7 +204,7 @@ def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool
     if as_json:
         _write_json(verification.as_dict())
     else:
-        click.echo(verification)
+        say(verification)
     if not verification.holds:
         sys.exit(1)
 
@@ -228,7 +230,7 @@ def plot(
     from . import planner
 
     planner.plot(planner.info(roadmap, overrides), path, output, depths or None, chart=chart, fronts=fronts)
-    click.echo(output)
+    say(output)
 
 
 @cli.command()
@@ -259,7 +261,7 @@ def describe(
     if as_json:
         _write_json(description.as_dict())
     else:
-        click.echo(description)
+        say(description)
 
 
 @cli.command()
@@ -275,7 +277,7 @@ def score(roadmap: Path, overrides: tuple[str, ...], route: Path, as_json: bool)
     if as_json:
         _write_json(found.as_dict())
     else:
-        click.echo(found, err=not found.flyable)
+        say(found, error=not found.flyable)
     if not found.flyable:
         sys.exit(1)
 
@@ -303,7 +305,7 @@ def calibrate(
     if as_json:
         _write_json(found.as_dict())
     else:
-        click.echo(found)
+        say(found)
 
 
 @cli.command()
@@ -338,23 +340,32 @@ def bench(
             ompl=ompl,
             quick=quick,
             only=only,
-            progress=lambda said: click.echo(f"suite: {said}", err=True),
+            progress=lambda said: say(f"suite: {said}", error=True),
         )
-        click.echo(report)
+        say(report)
         return
     if ompl is not None:
         raise click.UsageError("--ompl goes with --suite alone; add that or leave it out")
     record, moved = planner.bench(
         output, against=against, runs=5 if runs is None else runs, quick=quick, only=only, ceiling=ceiling,
-        progress=lambda figure: click.echo(f"bench: {figure}", err=True),
+        progress=lambda figure: say(f"bench: {figure}", error=True),
     )  # fmt: skip
-    click.echo(record)
+    say(record)
     if against is not None:
-        click.echo("\n".join(["moved beyond both spreads:", *(f"  {line}" for line in moved or ["nothing"])]))
+        say("\n".join(["moved beyond both spreads:", *(f"  {line}" for line in moved or ["nothing"])]))
 
 
 def main() -> None:
     """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
+    if hasattr(sys.stdout, "reconfigure"):
+        # a name that is no UTF-8, or a letter that an old terminal lacks, is written as \\udcff
+        sys.stdout.reconfigure(errors="backslashreplace")
+    os.environ["MPLBACKEND"] = "agg"  # a notebook's own draws nothing into files
+    with stoppable():
+        _run()
+
+
+def _run() -> None:
     try:
         _check_environment()
         cli(prog_name="glider-stream", standalone_mode=False)
@@ -367,16 +378,15 @@ def main() -> None:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         if error.filename is None:
-            # what is written to files names them: this is standard output, and what waits there goes nowhere
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            silence(sys.stdout)  # what is written to files names them: this is standard output
         _refuse(f"{error.filename or 'standard output'} cannot be used: {reason}; name another")
     except MemoryError as error:
         _refuse(f"there is not enough memory ({error}); make the problem smaller")
     except (click.Abort, KeyboardInterrupt) as error:
         # click makes an Abort of a KeyboardInterrupt
         stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
-        click.echo(f"glider-stream: {stopped}", err=True)
-        sys.exit(130)
+        say(f"glider-stream: {plain(str(stopped))}", error=True)
+        sys.exit(STOPPED)
 
 
 def _check_environment() -> None:
@@ -388,5 +398,5 @@ def _check_environment() -> None:
 
 
 def _refuse(sentence: str) -> None:
-    click.echo(f"glider-stream: {' '.join(sentence.split())}", err=True)
+    say(f"glider-stream: {plain(' '.join(sentence.split()))}", error=True)
     sys.exit(2)

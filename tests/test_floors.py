@@ -16,10 +16,10 @@ FLOORS = {
     4: "roadmap",
     5: "scenario search jobs",
     6: "plot pilot evaluation",
-    7: "planner cli",
+    7: "planner cli __main__",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
-DOORS = {("cli", "planner")}
+DOORS = {("cli", "planner"), ("__main__", "cli")}
 """The command line calls the planner, on its own floor."""
 
 

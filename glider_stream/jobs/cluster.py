@@ -2,7 +2,6 @@
 
 import contextlib
 import importlib
-import os
 import re
 import threading
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
+from ..base.cores import usable_cores
 from ..base.errors import InputError
 from ..base.settings import require
 from ..base.threads import threads
@@ -93,7 +93,7 @@ def scheduler(address: str) -> Iterator["Cluster"]:
         return
     count = int(own.group(1))
     require(count >= 1, f"a local cluster has 1 worker or more; got {address!r}")
-    each = max(1, (os.cpu_count() or 1) // count)
+    each = max(1, usable_cores() // count)
     with (
         distributed.LocalCluster(
             n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..base.errors import InputError, Unwritable
 from ..base.output import replacing
 from ..base.settings import require
+from ..base.terminal import plain
 from ..base.untrusted import check_claim, check_links
 from ..kernels.edges import Status
 from .builder import Tally
@@ -358,4 +359,7 @@ def _provenance(file: h5py.File) -> Provenance:
     words = {
         f.name: said[f.name] if f.default is MISSING else said.get(f.name, f.default) for f in fields(Provenance)
     }
-    return Provenance(seed=int(words.pop("seed")), **{name: str(value) for name, value in words.items()})
+    seed = int(words.pop("seed"))
+    # all but these are one line each, which is printed
+    texts = {n: str(v) if n in ("scenario", "inputs") else plain(str(v)) for n, v in words.items()}
+    return Provenance(seed=seed, **texts)

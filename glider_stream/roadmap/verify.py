@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.terminal import plain
 from ..base.threads import in_parallel, threads
 from ..kernels.cache import entry_point
 from ..kernels.control import glide_speed
@@ -73,8 +74,8 @@ class Verification:
         }
 
     def __str__(self) -> str:
-        lines = [f"{self.file}: {'verified' if self.holds else 'NOT what it says'}"]
-        lines += [f"  fault: {fault}" for fault in self.faults]
+        lines = [f"{plain(self.file)}: {'verified' if self.holds else 'NOT what it says'}"]
+        lines += [f"  fault: {plain(fault)}" for fault in self.faults]
         if self.edges:
             lines.append(f"  {self.edges:,} edges flown again, {self.sample:,} of them by DOP853")
         if self.differences.size:
