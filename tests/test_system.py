@@ -135,7 +135,7 @@ real, wanted = builtins.__import__, sys.argv.pop(1)
 
 def watched(name, *rest, **more):
     global wanted
-    if name == wanted or (rest and rest[-1] == 1 and name == wanted.removeprefix(".")):
+    if name == wanted:
         wanted = None
         os.kill(os.getpid(), signal.SIGINT)
     return real(name, *rest, **more)
@@ -146,12 +146,12 @@ main()
 """
 
 
-@pytest.mark.parametrize("module", ["click", ".planner", "numba", "h5py"])
+@pytest.mark.parametrize("module", ["click", "numba", "h5py"])
 def test_ctrl_c_while_modules_are_loaded(place, module):
     program = [sys.executable, "-c", EARLY, module, "build", "small.toml", "-o", "road.h5"]
     done = subprocess.run(program, capture_output=True, text=True)
     assert done.returncode in (-signal.SIGINT, 130), done
-    assert done.stderr in ("", "glider-stream: stopped\n")
+    assert done.stderr.strip() in ("", "glider-stream: stopped")
     assert os.listdir() == ["small.toml"]
 
 

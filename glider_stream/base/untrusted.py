@@ -1,6 +1,7 @@
 """Untrusted HDF5, and other packed files: what may not be followed, nor believed, before anything is read."""
 
 import math
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +15,16 @@ FREE = 50_000_000
 """Claims up to this size [bytes] need no proof."""
 MOST_OBJECTS = 10_000
 """No current file and no roadmap holds as many groups and datasets."""
+
+
+def check_file(path: str | Path, what: str) -> None:
+    """InputError where `what` is neither a file nor a folder: reading a pipe or a device may never end."""
+    try:
+        mode = Path(path).stat().st_mode
+    except (OSError, ValueError):
+        return  # who reads it says what is wrong
+    ordinary = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+    require(ordinary, f"{what} {path} is a pipe or a device, and no file; save it as a file first")
 
 
 def check_claim(file: str | Path, name: str, shape: Sequence[int], itemsize: int, held: int) -> None:
@@ -51,3 +62,13 @@ def check_links(path: str | Path) -> None:
                 elif isinstance(one, h5py.Dataset):
                     own = not one.external and not one.is_virtual
                     require(own, f"the data of `{name}` in {path} lie in other files, not followed: copy them in")
+                    _check_storage(path, name, one)
+
+
+def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
+    """InputError where a dataset is of lists, whose lengths may be anything, or larger than what is stored holds."""
+    inner = h5py.check_vlen_dtype(dataset.dtype)
+    even = inner is None or inner in (str, bytes)
+    require(even, f"`{name}` in {path} holds lists of uneven lengths, which are not read: write plain numbers")
+    if dataset.shape is not None and inner is None:
+        check_claim(path, f"`{name}`", dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())

@@ -24,6 +24,7 @@ from ..base.output import replacing
 from ..base.settings import require
 from ..base.threads import in_parallel, threads
 from ..base.toml import to_toml
+from ..base.untrusted import check_file
 from ..kernels.cache import KERNEL_DIGEST, entry_point
 from ..kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
 from ..kernels.motion import LANES, X, Y
@@ -345,6 +346,7 @@ def _said(value: float) -> str:
 def read_record(file: str | Path) -> dict[str, Any]:
     """A record that `bench --json` wrote; InputError where it is not one."""
     try:
+        check_file(file, "the record")
         record = json.loads(Path(file).read_text(encoding="utf-8"))
         for one in record["figures"]:
             sound = isinstance(one["name"], str) and one["low"] <= one["median"] <= one["high"]

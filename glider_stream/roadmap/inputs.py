@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
-from ..base.toml import to_toml
+from ..base.toml import check_depth, to_toml
 
 KEYS = {"flow": ("file",), "terrain": ("bathymetry", "keep_out")}
 """Per section of a scenario, the keys whose values name files."""
@@ -47,6 +47,7 @@ def settings_sha256(text: str) -> str:
     """A digest of a scenario without the names of its files, whose content has digests of its own."""
     try:
         table = tomllib.loads(text)
+        check_depth(table, "the scenario")
     except (ValueError, RecursionError):
         return hashlib.sha256(text.encode()).hexdigest()
     for place in names_of(table):

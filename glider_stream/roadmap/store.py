@@ -17,7 +17,7 @@ from ..base.errors import InputError, Unwritable
 from ..base.output import replacing
 from ..base.settings import require
 from ..base.terminal import plain
-from ..base.untrusted import check_claim, check_links
+from ..base.untrusted import check_claim, check_file, check_links
 from ..kernels.edges import Status
 from .builder import Tally
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
@@ -266,6 +266,7 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
 def _reading(path: Path) -> Iterator[h5py.File]:
     """An open file of ours; whatever its damage makes h5py raise is an InputError."""
     require(path.exists(), f"the roadmap {path} does not exist; build it first")
+    check_file(path, "the roadmap")
     try:
         check_links(path)
         with h5py.File(path, "r") as file:
@@ -304,16 +305,17 @@ def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
 def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray]:
     """The datasets by name, of the kind that they should be and no larger than the file can hold."""
     arrays: dict[str, AnyArray] = {}
-    held = path.stat().st_size
     for name in names:
         kind = _DESCRIBED[name][0]
         if name in _OPTIONAL and name not in file:
             continue
         require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
-        check_claim(path, name, file[name].shape, file[name].dtype.itemsize, held)
-        stored = np.asarray(file[name][()])
-        fits = stored.dtype.kind == np.dtype(kind).kind
-        require(fits, f"the roadmap {path} is damaged: {name} is {stored.dtype}, not {kind}; build it again")
+        dataset = file[name]
+        fits = isinstance(dataset, h5py.Dataset) and dataset.dtype.kind == np.dtype(kind).kind
+        said = getattr(dataset, "dtype", "a group")
+        require(fits, f"the roadmap {path} is damaged: {name} is {said}, not {kind}; build it again")
+        check_claim(path, name, dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
+        stored = np.asarray(dataset[()])
         arrays[name] = stored.astype(kind, copy=False)
         finite = bool(np.isfinite(arrays[name]).all())
         require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")

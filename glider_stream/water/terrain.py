@@ -26,6 +26,10 @@ MARGIN = 10.0
 """The raster keeps this far [m] from what it stands for: half a look of a leg, and what a map of a grid errs."""
 MOST_TEXT = 50_000_000
 """The most that a file of polygons may hold [bytes]."""
+MOST_VERTICES = 200_000
+"""Of one polygon, and pieces of its rim."""
+MOST_CROSSED = 300
+"""Vertices of a polygon that crosses itself: mended within a second; 3,000 took minutes and 3.7 GB."""
 SEEN, POLE = 60.0, 0.1
 """Polygons are looked at within so many degrees of longitude, and but so far from the poles."""
 DENSE = 0.02
@@ -176,16 +180,35 @@ def read_polygons(file: str | Path, frame: LocalFrame) -> list[Any]:
         bounds = np.array(one.bounds if not one.is_empty else [np.nan] * 4)
         on_earth = bool((np.abs(bounds) <= [540, 90, 540, 90]).all())  # False for NaN, too
         require(on_earth, f"{path.name} holds a polygon that is empty or not in degrees; mend it")
-        flat = shapely.make_valid(shapely.force_2d(one))
+        flat = _sound(path.name, shapely.force_2d(one))
         # what is on the other side of the globe has no place in a flat frame
         near = shapely.box(frame.lon - SEEN, -90 + POLE, frame.lon + SEEN, 90 - POLE)
         for turn in (-720, -360, 0, 360, 720):
-            part = shapely.segmentize(shapely.affinity.translate(flat, turn, 0).intersection(near), DENSE)
+            part = shapely.affinity.translate(flat, turn, 0).intersection(near)
             if part.is_empty:
                 continue
+            long = part.length / DENSE
+            fits = long <= MOST_VERTICES
+            require(fits, f"a polygon of {path.name} has a rim of {part.length:,.0f} degrees; simplify it")
+            part = shapely.segmentize(part, DENSE)
             local = shapely.transform(part, lambda at: np.stack(frame.to_local(at[:, 0], at[:, 1]), axis=-1))
             result.append(shapely.make_valid(local))
     return result
+
+
+def _sound(name: str, polygon: Any) -> Any:
+    """A polygon that does not cross itself; InputError where to mend it would take for ever."""
+    import shapely
+
+    count = int(shapely.get_num_coordinates(polygon))
+    fits = count <= MOST_VERTICES
+    require(fits, f"{name} holds a polygon of {count:,} vertices; simplify it to {MOST_VERTICES:,}")
+    if shapely.is_valid(polygon):
+        return polygon
+    # each crossing of two edges becomes a vertex, so their number grows with the square
+    few = f"with {count:,} vertices, too many to be mended here; give one of at most {MOST_CROSSED}, or mend it"
+    require(count <= MOST_CROSSED, f"{name} holds a polygon that crosses itself, {few}")
+    return shapely.make_valid(polygon)
 
 
 def _geometries(table: Any) -> list[Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...base.errors import InputError
 from ...base.settings import require
-from ...base.untrusted import check_claim, check_links
+from ...base.untrusted import check_claim, check_file, check_links
 
 MOST_STORE_FILES = 100_000
 """Files of a Zarr store that are looked at."""
@@ -25,6 +25,7 @@ def opened(path: Path) -> Iterator[Any]:
     import xarray
 
     require(path.exists(), f"the file {path} does not exist")
+    check_file(path, "the file")
     engine = _engine(path)
     with warnings.catch_warnings():
         # stale attributes of good data: several fill values, odd calendars
@@ -75,6 +76,7 @@ def _check_store(path: Path) -> None:
     """A Zarr store names its codecs; one that unpickles runs whatever it holds."""
     for count, file in enumerate(path.rglob("*")):
         require(count < MOST_STORE_FILES, f"{path} holds more than {MOST_STORE_FILES:,} files; cut the store")
+        check_file(file, f"in {path}, ")
         if file.name not in ("zarr.json", ".zarray", ".zmetadata"):
             continue
         try:
@@ -89,4 +91,6 @@ def _check_claims(path: Path, data: Any) -> None:
     """Refuse what no file of its size can hold, before room is made for it."""
     held = sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) if path.is_dir() else path.stat().st_size
     for name, variable in data.variables.items():
+        if path.is_dir() and (path / str(name)).is_dir():
+            held = sum(part.stat().st_size for part in (path / str(name)).rglob("*") if part.is_file())
         check_claim(path.name, f"`{name}`", variable.shape, variable.dtype.itemsize, held)
