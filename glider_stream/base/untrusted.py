@@ -66,7 +66,7 @@ def check_links(path: str | Path) -> None:
 
 
 def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
-    """InputError where a dataset is of lists, whose lengths may be anything, or larger than what is stored holds."""
+    """InputError where a dataset is of lists, whose lengths may be anything, or larger than it can be."""
     inner = h5py.check_vlen_dtype(dataset.dtype)
     even = inner is None or inner in (str, bytes)
     require(even, f"`{name}` in {path} holds lists of uneven lengths, which are not read: write plain numbers")
