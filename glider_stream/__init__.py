@@ -1,10 +1,12 @@
 """Underwater glider planning in ocean currents: exact legs, roadmaps, routes.
 
+import glider_stream
 from glider_stream import planner
 
-roadmap = planner.build("seed-box", "seed-box.h5")
-path = planner.query(roadmap)
-planner.plot(roadmap, path, "route.png")
+planner.build("seed-box", "seed-box.h5")
+road = glider_stream.open("seed-box.h5")
+path = road.query()
+road.plot(path, "route.png")
 """
 
 import importlib
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .base.errors import InputError
     from .kernels.edges import Status
+    from .opened import OpenedRoadmap, open
     from .roadmap.builder import build_roadmap
     from .roadmap.problem import Problem
     from .roadmap.roadmap import Roadmap
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError",
     "Leg",
+    "OpenedRoadmap",
     "Path",
     "Planner",
     "Problem",
@@ -37,6 +41,7 @@ __all__ = [
     "Surfacing",
     "__version__",
     "build_roadmap",
+    "open",
     "read_roadmap",
     "read_scenario",
     "shipped_scenarios",
@@ -46,6 +51,7 @@ __all__ = [
 _HOMES = {
     "base.errors": ("InputError",),
     "kernels.edges": ("Status",),
+    "opened": ("OpenedRoadmap", "open"),
     "roadmap.builder": ("build_roadmap",),
     "roadmap.problem": ("Problem",),
     "roadmap.roadmap": ("Roadmap",),

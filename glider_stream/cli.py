@@ -92,16 +92,25 @@ def build(
     from . import planner
     from .base.progress import reporter
 
-    given = {"base": base, "scheduler": scheduler, "checkpoint": checkpoint}
-    job = {name: value for name, value in given.items() if value is not None}
-    run: dict[str, Any] = {"threads": threads, "overrides": overrides, "restart": restart, **job}
+    run: dict[str, Any] = {
+        "threads": threads,
+        "overrides": overrides,
+        "restart": restart,
+        "checkpoint": checkpoint,
+        "scheduler": scheduler,
+        "base": base,
+    }
+    empty = ""
     with reporter("build") as progress:
         if shard is not None:
             planner.build_part(scenario, output, shard, progress=progress, **run)
             done = f"part {shard} of a roadmap"
         else:
-            done = str(planner.build(scenario, output, progress=progress, **run))
+            road = planner.build(scenario, output, progress=progress, **run)
+            done, empty = str(road), planner.why_no_edges(road)
     say(f"{done}\n  file:   {output}")
+    if empty:
+        say(f"note: {empty}", error=True)
 
 
 @cli.command()
@@ -111,7 +120,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     """Make one roadmap of PARTS, which `build --shard` wrote."""
     from . import planner
 
-    say(f"{planner.merge(parts, output)}\n  file:   {output}")
+    road = planner.merge(parts, output)
+    say(f"{road}\n  file:   {output}")
+    if empty := planner.why_no_edges(road):
+        say(f"note: {empty}", error=True)
 
 
 @cli.command()
@@ -130,6 +142,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
 @click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
+@click.option("--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given.")
+@click.option(
+    "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
+)
 @click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
 @JSON
 def query(
@@ -144,28 +160,40 @@ def query(
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
+    waypoints: int | None,
+    arrival_radius: float | None,
     front: bool,
     as_json: bool,
 ) -> None:
     """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
-    from . import planner
+    from .opened import open
+    from .pilot.export import check_export
+    from .search.surfacing import Surfacing
 
-    road = planner.info(roadmap, overrides)
-    rule = {name: n for name, n in (("most_yos", most_yos), ("most_hours", most_hours)) if n is not None}
+    free = most_yos is None and most_hours is None
+    rule = None if free else Surfacing(most_yos, most_hours)
+    said: Any
+    given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
+    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if front:
-        alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+        alone = not outputs and most_energy is None and thin is None and not asked and not as_card
         if not alone:
             raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
-                "leave one of them out"
+                "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
+                "--waypoints and --arrival-radius; leave one of them out"
             )
-        said: Any
-        corners = planner.trade_off(road, start, goal)
+        corners = open(roadmap, overrides).trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     else:
-        hours = {} if window_hours is None else {"window_hours": window_hours}
-        path = planner.query(road, start, goal, outputs, most_energy, thin, rule or None, **hours)
-        said, found = planner.card(road, path) if as_card and path.found else path, path.found
+        for output in outputs:
+            check_export(output)
+        road = open(roadmap, overrides)
+        path = road.query(
+            start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
+        )
+        for note in path.notes:
+            say(f"note: {note}", error=True)
+        said, found = road.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:
@@ -229,7 +257,7 @@ def plot(
     """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
     from . import planner
 
-    planner.plot(planner.info(roadmap, overrides), path, output, depths or None, chart=chart, fronts=fronts)
+    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts, overrides=overrides)
     say(output)
 
 
@@ -267,18 +295,39 @@ def describe(
 @cli.command()
 @ROADMAP
 @ELSEWHERE
-@click.argument("route", type=FILE)
+@click.argument("route", nargs=-1, required=True, type=FILE)
+@click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
 @JSON
-def score(roadmap: Path, overrides: tuple[str, ...], route: Path, as_json: bool) -> None:
-    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails."""
-    from . import planner
+def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], start: Any, as_json: bool) -> None:
+    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails.
 
-    found = planner.score(planner.info(roadmap, overrides), route)
+    CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
+    """
+    from .opened import open
+
+    found = open(roadmap, overrides).score(route, start)
     if as_json:
         _write_json(found.as_dict())
     else:
         say(found, error=not found.flyable)
     if not found.flyable:
+        sys.exit(1)
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--waypoints", type=int, default=8, show_default=True, help="Waypoints a goto list may hold.")
+@JSON
+def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
+    """Look for faults in FILES that vehicles fly: goto lists, yo files, targets; exit code 1 if there are any."""
+    from . import planner
+
+    looked = planner.lint(files, waypoints)
+    if as_json:
+        _write_json([one.as_dict() for one in looked])
+    else:
+        say("\n".join(map(str, looked)))
+    if any(one.faults for one in looked):
         sys.exit(1)
 
 

@@ -16,11 +16,11 @@ FLOORS = {
     4: "roadmap",
     5: "scenario search jobs",
     6: "plot pilot evaluation",
-    7: "planner cli __main__",
+    7: "opened planner cli __main__",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
-DOORS = {("cli", "planner"), ("__main__", "cli")}
-"""The command line calls the planner, on its own floor."""
+DOORS = {("planner", "opened"), ("cli", "planner"), ("cli", "opened"), ("__main__", "cli")}
+"""On their own floor, the command line calls the planner, and both open roadmaps."""
 
 
 def module_name(path):

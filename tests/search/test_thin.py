@@ -11,11 +11,12 @@ from helpers.reference import flown
 from helpers.routes import route
 from helpers.small import TOLERANCE, command, roadmap, strict_json
 
-from glider_stream import planner
+from glider_stream.base.clock import span
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
+from glider_stream.search.answer import with_fewer_legs
 from glider_stream.search.path import hops_of
 from glider_stream.search.query import Planner
 from glider_stream.search.surfacing import Surfacing, SurfacingPlanner
@@ -98,12 +99,12 @@ def test_a_rule_of_surfacing_survives(search):
     late = replace(path, legs=tuple(replace(leg, duration=3600.0) for leg in path.legs))
     keeper = SurfacingPlanner(roadmap(), search.problem, slow.rule)
     keeper.fly = lambda hops: late
-    kept = planner._with_fewer_legs(path, 1e4, keeper, None)
+    kept = with_fewer_legs(path, 1e4, keeper, None)
     assert kept.legs == path.legs
     dear = replace(path, cost=1e9)
     free = SimpleNamespace(connect=lambda a, b: GOOD, fly=lambda hops: dear)
-    assert planner._with_fewer_legs(path, 1e4, free, 10.0).cost == path.cost
-    assert planner._with_fewer_legs(path, 1e4, free, None).cost == 1e9
+    assert with_fewer_legs(path, 1e4, free, 10.0).cost == path.cost
+    assert with_fewer_legs(path, 1e4, free, None).cost == 1e9
 
 
 def test_from_the_command_line(tmp_path, capsys):
@@ -115,7 +116,7 @@ def test_from_the_command_line(tmp_path, capsys):
     assert fewer["unthinned"] == {"legs": len(whole["legs"]), "travel_time_s": whole["travel_time_s"]}
     assert len(fewer["legs"]) < len(whole["legs"])
     said = command(capsys, *asked).out.splitlines()[0]
-    assert said.endswith(f"; before it was thinned {len(whole['legs'])}, {whole['travel_time_s']:,.0f} s")
+    assert said.endswith(f"; before it was thinned {len(whole['legs'])}, {span(whole['travel_time_s'])}")
     for wrong in ("-1", "nan", "inf"):
         refused = command(capsys, *asked[:-1], wrong)
         assert (refused.code, f"got {wrong}" in refused.err) == (2, True)

@@ -1,0 +1,89 @@
+"""What is drawn, and where: a roadmap, a route, its chart, or a page of it."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path as File
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.output import check_output
+from ..base.settings import require
+from ..roadmap.problem import Problem
+from ..roadmap.roadmap import Roadmap
+from ..search.path import Path
+from .along import placed
+from .canvas import check_figure, save_figure
+from .chart import plot_chart
+from .fronts import Fronts, fronts_of
+from .page import PAGE, save_page
+from .roadmap import plot_roadmap
+from .route import plot_route
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def is_page(output: str | File | None) -> bool:
+    """Whether an output is a page to look around in."""
+    return output is not None and File(output).suffix.lower() == PAGE
+
+
+def check_drawing(
+    output: str | File | None, path: object, depths: Sequence[float] | None, chart: bool, fronts: float | None
+) -> None:
+    """InputError where what is asked for does not go together, or cannot be written: before any work."""
+    as_page = is_page(output)
+    if output is not None:
+        check_output(output) if as_page else check_figure(output)
+    needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
+    plain = not chart and not as_page and fronts is None
+    require(path is not None or plain, f"{needs} needs a path, got none; give the file that `query -o` wrote")
+    one = path is not None or depths is None or len(depths) == 1
+    require(one, f"a roadmap is drawn at one depth; got {depths}")
+
+
+def draw_roadmap(
+    road: Roadmap, problem: Problem, output: str | File | None, depths: Sequence[float] | None, title: str
+) -> "Figure":
+    """The roadmap at one depth."""
+    flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
+    figure = plot_roadmap(flow, terrain, problem, road, None if depths is None else depths[0], title)
+    if output is not None:
+        save_figure(figure, output)
+    return figure
+
+
+def draw_route(
+    road: Roadmap,
+    problem: Problem,
+    route: Path,
+    output: str | File | None,
+    depths: Sequence[float] | None,
+    chart: bool,
+    fronts: float | None,
+    arrivals: Callable[[Array], Array],
+    title: str,
+) -> "Figure | None":
+    """A route over maps of the current, by time on a chart, or as a page: then no figure is returned.
+
+    `arrivals` of a start (3,) [m]: when each node can be reached at the soonest [s], for `fronts` [h].
+    """
+    flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
+    stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
+    here = bool(problem.evaluator.allowed(stops, problem.departure).all())
+    require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
+    if not chart and fronts is None and not is_page(output):
+        figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+    else:
+        route = placed(route, problem)
+        every: tuple[Fronts, float] | None = None
+        if fronts is not None:
+            every = fronts_of(road.position, arrivals(route.start), terrain), fronts
+        if output is not None and is_page(output):
+            save_page(output, flow, terrain, problem, road.position, route, depths, every, title)
+            return None
+        figure = plot_chart(flow, terrain, problem, route, depths, every, title)
+    if output is not None:
+        save_figure(figure, output)
+    return figure
