@@ -2,13 +2,15 @@
 
 import json
 import os
+import re
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .base.errors import InputError, Stopped
+from .base.errors import InputError, InputWarning, Stopped
 from .base.interrupt import STOPPED, stoppable
 from .base.terminal import plain, say, silence
 
@@ -31,17 +33,21 @@ def place_and_time(text: str) -> tuple[Any, ...]:
 
 
 def key_and_value(text: str) -> tuple[str, Any]:
-    """A key, and its value: a whole number, or a text."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip() or not value.strip():
+    """A key, and its value: a number, or a text."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE, such as units=cm/s")
-    return key.strip(), int(value) if value.strip().isdecimal() else value.strip()
+    if value.isdecimal():
+        return key, int(value)
+    return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
 def _write_json(value: Any) -> None:
     say(json.dumps(value, indent=1))
 
 
+TRACE = "GLIDER_STREAM_TRACE"
+"""Name of the variable of the environment that shows the trace of an error of this program."""
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
@@ -405,7 +411,7 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
+    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input, 3 an error of this program."""
     if hasattr(sys.stdout, "reconfigure"):
         # a name that is no UTF-8, or a letter that an old terminal lacks, is written as \\udcff
         sys.stdout.reconfigure(errors="backslashreplace")
@@ -417,6 +423,7 @@ def main() -> None:
 def _run() -> None:
     try:
         _check_environment()
+        _show_warnings()
         cli(prog_name="glider-stream", standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
@@ -436,6 +443,29 @@ def _run() -> None:
         stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
         say(f"glider-stream: {plain(str(stopped))}", error=True)
         sys.exit(STOPPED)
+    except Exception as error:
+        if os.environ.get(TRACE):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        say(
+            f"glider-stream: an error of this program, and not of your input: {what}; "
+            f"please report it, with what {TRACE}=1 in the environment shows",
+            error=True,
+        )
+        sys.exit(3)
+
+
+def _show_warnings() -> None:
+    """Warnings on input in one line, without the place in this program."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+        if issubclass(category, InputWarning):
+            say(f"glider-stream: warning: {message}", error=True)
+        else:
+            usual(message, category, *rest, **named)
+
+    warnings.showwarning = show
 
 
 def _check_environment() -> None:

@@ -201,9 +201,9 @@ class Scenario:
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
-            words = asked.variable, asked.positive
+            words = asked.variable, asked.positive, asked.names
             bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *words)]
-        return raster_terrain(asked, frame, *box, bottoms)
+        return raster_terrain(asked, frame, *box, bottoms, domain.box())
 
 
 def shipped_scenarios() -> dict[str, Path]:

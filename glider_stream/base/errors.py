@@ -5,6 +5,10 @@ class InputError(ValueError):
     """Unusable input; the message is one sentence that names the value received and the cure."""
 
 
+class InputWarning(UserWarning):
+    """Input that can be used, though it may not say what was meant; the message is one sentence."""
+
+
 class Unwritable(InputError):
     """An output that cannot be written whole, as on a full disk."""
 

@@ -72,3 +72,19 @@ def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
     require(even, f"`{name}` in {path} holds lists of uneven lengths, which are not read: write plain numbers")
     if dataset.shape is not None and inner is None:
         check_claim(path, f"`{name}`", dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
+
+
+def groups_of(path: str | Path) -> tuple[list[str], set[str]]:
+    """The names of all groups of a file, and of those with data of two dimensions or more; "" is the root."""
+    every: list[str] = []
+    grids: set[str] = set()
+
+    def look(name: str, one: object) -> None:
+        if isinstance(one, h5py.Group):
+            every.append(name)
+        elif isinstance(one, h5py.Dataset) and one.ndim >= 2:
+            grids.add(name.rpartition("/")[0])
+
+    with h5py.File(path, "r") as file:
+        file.visititems(look)
+    return every, grids

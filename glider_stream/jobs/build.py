@@ -20,7 +20,7 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
 from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, by_node, in_order
 from ..roadmap.shard import Shard
-from ..roadmap.step_error import with_steps_checked
+from ..roadmap.step_error import StepSample
 from ..roadmap.store import read_part, writing
 from .journal import Journal
 
@@ -120,15 +120,15 @@ def _run(
     progress: Callable[[Progress], None],
     batch_pairs: int,
 ) -> None:
-    made = with_steps_checked(
-        made, problem, position, lambda some: in_order(list(job.finder(problem, position, some, batch_pairs)))
-    )
     nodes = np.arange(*shard.nodes(len(position)))
-    tally = Tally(len(nodes), used)
+    tally, sample = Tally(len(nodes), used), StepSample(len(position))
     if old.source.size:
         tally.add(old)
+        sample.take(old)
     for edges in journal.records():
         tally.add(edges)
+        sample.take(edges)
+    made = sample.checked(made, problem, position, lambda some: job.finder(problem, position, some, batch_pairs))
     known = journal.done.copy()
     twice = known[old.source].any()
     require(not twice, f"{journal.path} holds nodes that --from has right; begin anew with --restart")

@@ -59,6 +59,7 @@ class Card:
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON."""
         return {
+            "departs": None if self.path.departs is None else self.path.departs.isoformat(),
             "legs": [row.as_dict() for row in self.legs],
             "whole": self.whole.as_dict(),
             "surface_to_surface_s": list(self.under),

@@ -15,7 +15,7 @@ from .along import Along, along
 from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
-from .seabed import known_until, sample_bottom
+from .seabed import sample_bottom
 from .water import Frame, checked_depths, frame_of
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def plot_chart(
         look = {"location": "bottom", "aspect": 45, "pad": 0.01}
         left.colorbar(line, ax=ax, label=f"Time since departure ({name})", **look)
         panels = right.subplots(3, 1, sharex=True, height_ratios=(1.25, 1.0, 1.0))
-        _draw_depth(panels[0], flow, terrain, rows, clock)
+        _draw_depth(panels[0], terrain, rows, clock)
         steps = along(path)
         _draw_heading(panels[1], steps, clock)
         _draw_speeds(panels[2], steps, clock)
@@ -111,10 +111,9 @@ def _draw_route(ax: "Axes", frame: Frame, rows: Array, stops: Array, clock: _Clo
     return route
 
 
-def _draw_depth(ax: "Axes", flow: Flow, terrain: Terrain, rows: Array, clock: _Clock) -> None:
+def _draw_depth(ax: "Axes", terrain: Terrain, rows: Array, clock: _Clock) -> None:
     time, depth = rows[:, 0] / clock.unit, -rows[:, 3] + 0.0
-    known = known_until(flow, terrain)
-    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known)
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2])
     deepest, near = max(float(depth.max()), 1.0), float(seabed.min())
     shown = np.isfinite(seabed).any() and near < DEEP * deepest
     end = 1.12 * deepest
@@ -128,8 +127,8 @@ def _draw_depth(ax: "Axes", flow: Flow, terrain: Terrain, rows: Array, clock: _C
     ax.add_collection(_by_time(np.column_stack([time, depth]), rows[:, 0], clock, 2.0))
     ax.set(xlim=(time[0], time[-1]), ylim=(end, -0.05 * end), ylabel="Depth (m)")
     said = "over the seabed" if shown else "no seabed on the way"
-    if not shown and np.isfinite([near, known]).any():
-        said = f"the seabed lies at {min(near, -known):,.0f} m or deeper"
+    if not shown and np.isfinite(near):
+        said = f"the seabed lies at {near:,.0f} m or deeper"
     ax.set_title(f"(b) Depth, {said}")
 
 

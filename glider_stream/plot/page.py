@@ -25,7 +25,7 @@ from .along import along
 from .canvas import length_unit, said_time, said_when, thinned, time_unit
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
-from .seabed import known_until, sample_bottom
+from .seabed import sample_bottom
 from .water import Frame, frame_of, sample_field
 
 if TYPE_CHECKING:
@@ -68,8 +68,8 @@ def save_page(
         "unit": dict(zip(("size", "name"), length_unit(frame.x, frame.y), strict=True)),
         "lonlat": _lonlat(frame),
         "current": _current(flow, frame, levels, problem.departure),
-        "seabed": _seabed(flow, terrain, frame),
-        "legs": _legs(flow, terrain, path),
+        "seabed": _seabed(terrain, frame),
+        "legs": _legs(terrain, path),
         "fronts": None if fronts is None else _fronts(*fronts),
     }
     text = page_text(held, held["title"])
@@ -139,20 +139,20 @@ def _current(flow: Flow, frame: Frame, depths: Array, t: float) -> dict[str, Any
     }
 
 
-def _seabed(flow: Flow, terrain: Terrain, frame: Frame) -> dict[str, Any] | None:
+def _seabed(terrain: Terrain, frame: Frame) -> dict[str, Any] | None:
     """Depth of the seabed at cell centres [m], 0 on land, None where it is not known; None if nowhere."""
     x, y = frame.mesh(SEABED_CELLS)
-    depth = -sample_bottom(terrain, x, y, known_until(flow, terrain))
+    depth = -sample_bottom(terrain, x, y)
     if not np.isfinite(depth).any():
         return None
     return {"cells": [x.shape[1], x.shape[0]], "depth": _numbers(depth, 0)}
 
 
-def _legs(flow: Flow, terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
+def _legs(terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
     most = max(FEWEST, MOST_ROWS // len(path.legs))
     kept = [leg.trajectory[thinned(len(leg.trajectory), most)] for leg in path.legs]
     rows = np.concatenate(kept)
-    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known_until(flow, terrain))
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2])
     last = np.cumsum([len(some) for some in kept])
     means = _means(path)
     legs = []

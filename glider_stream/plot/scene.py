@@ -9,7 +9,7 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from .canvas import GREY, INK, colours, thinned
 from .graticule import draw_graticule
-from .seabed import without_clearance
+from .seabed import ground_of
 from .water import Frame, sample_field, sample_water
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:
 
     x, y = frame.mesh(PIXELS)
     dry = (~sample_water(terrain, x, y, -depth)).astype(np.float64)
-    land = ~sample_water(without_clearance(terrain), x, y, 0.0)
+    land = ~sample_water(ground_of(terrain), x, y, 0.0)
     dry += land
     ends = [side / frame.unit for side in (*frame.x, *frame.y)]
     grey = ListedColormap(["white", SEABED, LAND])

@@ -17,7 +17,7 @@ from .pairs import Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
 from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
-from .step_error import with_steps_checked
+from .step_error import StepSample
 
 BATCH_PAIRS = 100_000
 
@@ -121,11 +121,11 @@ def build_roadmap(
     parts: list[Edges] = []
     with threads(thread_count) as used:
         warm_up(problem)
-        made = with_steps_checked(
+        made = StepSample(len(position)).checked(
             provenance_of(problem, position),
             problem,
             position,
-            lambda nodes: in_order(list(find_edges(problem, position, nodes, batch_pairs))),
+            lambda nodes: find_edges(problem, position, nodes, batch_pairs),
         )
         tally = Tally(len(position), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):

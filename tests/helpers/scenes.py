@@ -66,7 +66,7 @@ def ocean_scene():
     levels, times = np.array([-500.0, 0.0]), np.array([0.0, days])
     box = (lo, hi, lo, hi, 0.0, days)
     flow = OceanGrid(values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, *box, 0.4, 2e3)
-    terrain = Seabed(bottom, 20.0, index_map, per, per, lo, lo)
+    terrain = Seabed(bottom, 20.0, index_map, per, per, lo, lo, bottom)
     position = np.random.default_rng(1).uniform([lo, lo, -500], [hi, hi, 0], (1500, 3))
     position = position[plot.sample_water(terrain, *position.T)]
     box = {"lo": np.array([lo, lo, -500]), "hi": np.array([hi, hi, 0])}

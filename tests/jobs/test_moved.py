@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from helpers.builds import datasets, interrupt
-from helpers.currents import SCENARIO, write
+from helpers.forecasts import SCENARIO, write
 from helpers.small import command
 
 from glider_stream import planner

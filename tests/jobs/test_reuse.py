@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from helpers.builds import datasets
-from helpers.currents import SCENARIO, write
+from helpers.forecasts import SCENARIO, write
 from helpers.small import command, scenario_file
 
 from glider_stream import planner

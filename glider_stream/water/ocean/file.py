@@ -21,8 +21,10 @@ class OceanFile:
     """Currents as a file holds them: `u` east, `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data.
 
     `grid` (ny, nx); `depth` (nz) rises downward [m]; `times` (nt) UTC, or None if unknown; `wet` (nz, ny, nx)
-    where there is data at every time. `surface`: the file names no depth, `depth` is [0]. `seabed` (ny, nx)
-    [m, downward] where the model says it. `took` says what was taken for what; `notes` what else to know.
+    where there is data at every time. `surface`: the file names no depth, or its one level is held at all;
+    `depth` is [0]. `lower` (nz) [m]: how deep the value of each level holds; `top` [m]: how shallow the first.
+    `seabed` (ny, nx) [m, downward]: of the model's own depth or of the deepest level with data, inf where the
+    data go on to the last level. `took` says what was taken for what, `notes` what else to know.
     """
 
     name: str
@@ -34,8 +36,17 @@ class OceanFile:
     wet: Bools
     surface: bool
     took: dict[str, str]
-    notes: tuple[str, ...] = ()
-    seabed: Array | None = None
+    notes: tuple[str, ...]
+    seabed: Array
+    lower: Array
+    top: float
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What was assumed of bottom, land, levels and times, for a roadmap to keep."""
+        return tuple(
+            f"{key}: {self.took[key]}" for key in ("bottom", "land", "levels", "stamps") if key in self.took
+        )
 
     @property
     def steady(self) -> bool:
