@@ -5,14 +5,18 @@ import os
 import re
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .base.errors import InputError, InputWarning, Stopped
 from .base.interrupt import STOPPED, stoppable
 from .base.terminal import plain, say, silence
+
+if TYPE_CHECKING:
+    from .opened import OpenedScenario
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -132,31 +136,75 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
         say(f"note: {empty}", error=True)
 
 
+ROUTE_OPTIONS = (
+    click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic."),
+    click.option("--goal", type=place, metavar="X,Y,Z", help="As --start."),
+    click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write."),
+    click.option(
+        "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
+    ),
+    click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most."),
+    click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most."),
+    click.option(
+        "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
+    ),
+    click.option(
+        "--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals."
+    ),
+    click.option(
+        "--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given."
+    ),
+    click.option(
+        "--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given."
+    ),
+    click.option(
+        "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
+    ),
+    click.option(
+        "--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead."
+    ),
+    click.option(
+        "--depart-between", nargs=2, metavar="A B", help="Try departures: seconds of the flow, or times (UTC)."
+    ),
+    click.option("--every", type=float, metavar="SECONDS", help="With --depart-between: how far they lie apart."),
+    click.option("--arrive-by", metavar="T", help="Find the latest departure that arrives by a time."),
+    click.option("--figure", type=FILE, help="Travel time and arrival against departure: PNG, SVG or PDF."),
+    JSON,
+)
+
+
+def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of what finds a route."""
+    for option in reversed(ROUTE_OPTIONS):
+        command = option(command)
+    return command
+
+
 @cli.command()
 @ROADMAP
 @ELSEWHERE
-@click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
-@click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
-@click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
-@click.option(
-    "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
-)
-@click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
-@click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
-@click.option(
-    "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
-)
-@click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
-@click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
-@click.option("--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given.")
-@click.option(
-    "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
-)
-@click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
-@JSON
-def query(
-    roadmap: Path,
-    overrides: tuple[str, ...],
+@route_options
+def query(roadmap: Path, overrides: tuple[str, ...], **asked: Any) -> None:
+    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
+    from .opened import open
+
+    _answer(lambda: open(roadmap, overrides), **asked)
+
+
+@cli.command()
+@click.argument("scenario")
+@route_options
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
+    """Find a route of SCENARIO without a roadmap: each leg leaves when the last one arrives."""
+    from .opened import open_scenario
+
+    _answer(lambda: open_scenario(scenario, overrides), **asked)
+
+
+def _answer(
+    opened: "Callable[[], OpenedScenario]",
+    *,
     start: Any,
     goal: Any,
     outputs: tuple[Path, ...],
@@ -169,37 +217,52 @@ def query(
     waypoints: int | None,
     arrival_radius: float | None,
     front: bool,
+    depart_between: tuple[str, str] | None,
+    every: float | None,
+    arrive_by: str | None,
+    figure: Path | None,
     as_json: bool,
 ) -> None:
-    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
-    from .opened import open
+    """Print what was asked for of a roadmap or a scenario; exit code 1 where there is no path."""
     from .pilot.export import check_export
     from .search.surfacing import Surfacing
 
     free = most_yos is None and most_hours is None
     rule = None if free else Surfacing(most_yos, most_hours)
+    departures = depart_between is not None or arrive_by is not None
     said: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    alone = not outputs and most_energy is None and thin is None and not asked and not as_card
+    if front and (departures or not alone):
+        raise click.UsageError(
+            "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
+            "--waypoints, --arrival-radius, --depart-between and --arrive-by; leave one of them out"
+        )
+    if departures and not alone:
+        raise click.UsageError(
+            "--depart-between and --arrive-by go with none of --output, --most-energy, --thin, --card, "
+            "--window-hours, --waypoints and --arrival-radius; set query.departure to what they find"
+        )
+    if not departures and (every is not None or figure is not None):
+        raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
     if front:
-        alone = not outputs and most_energy is None and thin is None and not asked and not as_card
-        if not alone:
-            raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
-                "--waypoints and --arrival-radius; leave one of them out"
-            )
-        corners = open(roadmap, overrides).trade_off(start, goal, surfacing=rule)
+        corners = opened().trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+    elif departures:
+        ends: dict[str, Any] = {"start": start, "goal": goal, "surfacing": rule}
+        said = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
+        found = said.found
     else:
         for output in outputs:
             check_export(output)
-        road = open(roadmap, overrides)
-        path = road.query(
+        source = opened()
+        path = source.query(
             start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
         )
         for note in path.notes:
             say(f"note: {note}", error=True)
-        said, found = road.card(path) if as_card and path.found else path, path.found
+        said, found = source.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
     else:
@@ -309,9 +372,9 @@ def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], st
 
     CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
     """
-    from .opened import open
+    from .opened import open_either
 
-    found = open(roadmap, overrides).score(route, start)
+    found = open_either(roadmap, overrides).score(route, start)
     if as_json:
         _write_json(found.as_dict())
     else:

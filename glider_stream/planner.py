@@ -10,7 +10,7 @@ from .base.output import check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
-from .opened import OpenedRoadmap
+from .opened import OpenedRoadmap, open_either, open_scenario
 from .opened import open as open_roadmap
 from .pilot.card import Card
 from .pilot.export import check_export
@@ -182,13 +182,39 @@ def query(
     )
 
 
+def plan(
+    scenario: str | File | Scenario,
+    start: Point | None = None,
+    goal: Point | None = None,
+    outputs: Sequence[str | File] = (),
+    most_energy: float | None = None,
+    thin: float | None = None,
+    surfacing: Surfacing | None = None,
+    window_hours: float = HOURS,
+    *,
+    overrides: Sequence[str] = (),
+) -> Path:
+    """The cheapest path of a scenario without a roadmap; all else as in `query`."""
+    for output in outputs:
+        check_export(output)
+    return open_scenario(scenario, overrides).query(
+        start,
+        goal,
+        outputs=outputs,
+        most_energy=most_energy,
+        thin=thin,
+        surfacing=surfacing,
+        window_hours=window_hours,
+    )
+
+
 def trade_off(
     roadmap: AnyRoadmap,
     start: Point | None = None,
     goal: Point | None = None,
     surfacing: Surfacing | None = None,
 ) -> TradeOff:
-    """The paths of one query that are best for some price of time against energy; all else as in `query`."""
+    """Every path of one query that no other beats both in time and in energy; all else as in `query`."""
     return open_roadmap(roadmap).trade_off(start, goal, surfacing=surfacing)
 
 
@@ -197,9 +223,11 @@ def card(roadmap: AnyRoadmap, path: Path) -> Card:
     return open_roadmap(roadmap).card(path)
 
 
-def score(roadmap: AnyRoadmap, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
+def score(
+    roadmap: AnyRoadmap | Scenario, route: str | File | Sequence[str | File], start: Point | None = None
+) -> Score:
     """Fly a drawn route, from one file or several, in a roadmap's water, as `OpenedRoadmap.score` has it."""
-    return open_roadmap(roadmap).score(route, start)
+    return open_either(roadmap).score(route, start)
 
 
 def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
@@ -231,7 +259,7 @@ def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) 
 
 
 def plot(
-    roadmap: AnyRoadmap,
+    roadmap: AnyRoadmap | Scenario,
     path: str | File | Path | None = None,
     output: str | File | None = None,
     depths: Sequence[float] | None = None,
@@ -240,11 +268,11 @@ def plot(
     fronts: float | None = None,
     overrides: Sequence[str] = (),
 ) -> "Figure | None":
-    """Draw a path over its roadmap, or the roadmap where there is none, as `OpenedRoadmap.plot` has it."""
+    """Draw a path over its roadmap or scenario, or the roadmap, as `OpenedRoadmap.plot` has it."""
     from .plot.draw import check_drawing
 
     check_drawing(output, path, depths, chart, fronts)  # before the roadmap is read
-    return open_roadmap(roadmap, overrides).plot(path, output, depths, chart=chart, fronts=fronts)
+    return open_either(roadmap, overrides).plot(path, output, depths, chart=chart, fronts=fronts)
 
 
 def plot_steering(

@@ -66,9 +66,12 @@ KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
 
 @dataclass(frozen=True)
 class QueryPoints:
-    """`start` and `goal` in the domain's coordinates; gliders leave every node at `departure` [s].
+    """`start` and `goal` in the domain's coordinates; a route leaves at `departure` [s].
 
-    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule.
+    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule. In a flow that changes
+    each leg leaves when the last one arrives, but for `frozen`: then all meet the current of the departure.
+    `bins` [s]: ways to a node that arrive in different bins of time are kept side by side, where leaving later
+    may arrive earlier.
     """
 
     start: Point
@@ -76,8 +79,12 @@ class QueryPoints:
     departure: float = 0.0
     most_yos: int | None = None
     most_hours: float | None = None
+    frozen: bool = False
+    bins: float | None = None
 
     def __post_init__(self) -> None:
+        fits = self.bins is None or 0 < self.bins <= LONGEST
+        require(fits, f"`query.bins` must be above 0 s, {LONGEST:g} at most; got {self.bins}")
         fits = abs(self.departure) <= LONGEST
         require(fits, f"`query.departure` must be within {LONGEST:g} s of 0; got {self.departure:g}")
 
@@ -134,6 +141,8 @@ class Scenario:
             glider_words=str(self.glider),
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
             departs=self._departs(),
+            frozen=self.query is not None and self.query.frozen,
+            bins=None if self.query is None else self.query.bins,
             domain=self.domain,
         )
 

@@ -18,9 +18,12 @@ from ..roadmap.builder import build_roadmap
 from ..roadmap.neighbours import Reachable
 from ..roadmap.nodes import SobolSampler
 from ..roadmap.problem import Problem
+from ..roadmap.roadmap import Roadmap
 from ..roadmap.steering import FlowMapMethod, Method, StreamlineMethod, SurfaceMethod
 from ..scenario import read_scenario
-from ..search.query import Planner
+from ..search.answer import planner_of
+from ..search.assembly import RoutePlanner
+from ..search.surfacing import Surfacing
 from .baselines import BASELINES
 from .bench import made_by
 from .brute_force import fastest_legs
@@ -177,10 +180,11 @@ def run_suite(
         for name in chosen:
             problem = read_scenario(name, [LAW]).problem()
             roads = {method: _with(problem, steering) for method, steering in METHODS.items()}
-            planners = {method: Planner(build_roadmap(case), case) for method, case in roads.items()}
-            outcomes += [_outcome(name, method, planner) for method, planner in planners.items()]
+            built = {method: build_roadmap(case) for method, case in roads.items()}
+            planners = {method: planner_of(roads[method], road, Surfacing()) for method, road in built.items()}
+            outcomes += [_outcome(name, method, built[method], planner) for method, planner in planners.items()]
             outcomes += _baselines(name, problem)
-            position = planners["flow-map"].roadmap.position
+            position = built["flow-map"].position
             completeness[name] = _completeness(roads["flow-map"], position, 2 if quick else 16)
             attempts += _attempts(name, problem, planners, 2 if quick else pairs, 256 if quick else DENSE)
             progress(f"{name}: {outcomes[-len(METHODS) - len(BASELINES)].travel_time:,.0f} s")
@@ -191,8 +195,8 @@ def _with(problem: Problem, steering: Method) -> Problem:
     return replace(problem, evaluator=replace(problem.evaluator, steering=steering))
 
 
-def _outcome(name: str, method: str, planner: Planner) -> Outcome:
-    road, path = planner.roadmap, planner.query()
+def _outcome(name: str, method: str, road: Roadmap, planner: RoutePlanner) -> Outcome:
+    path = planner.query()
     return Outcome(name, method, path.travel_time, road.wall_s, road.target.size, road.evaluated)
 
 
@@ -219,7 +223,9 @@ def _completeness(problem: Problem, position: Array, count: int) -> tuple[float,
     return (float(found.mean()) if found.size else 1.0), found.size
 
 
-def _attempts(name: str, problem: Problem, planners: dict[str, Planner], count: int, dense: int) -> list[Attempt]:
+def _attempts(
+    name: str, problem: Problem, planners: dict[str, RoutePlanner], count: int, dense: int
+) -> list[Attempt]:
     """Queries between random points, by every planner and baseline, and by a denser roadmap."""
     rng = np.random.default_rng(1)
     points = rng.uniform(problem.lo, problem.hi, (8 * count, 3))
@@ -230,7 +236,7 @@ def _attempts(name: str, problem: Problem, planners: dict[str, Planner], count: 
         sampler=SobolSampler(count=dense, seed=1),
         law=Reachable(DENSE_LIMIT),
     )
-    planners = planners | {BEST: Planner(build_roadmap(best), best)}
+    planners = planners | {BEST: planner_of(best, build_roadmap(best), Surfacing())}
     made = []
     for pair, (start, goal) in enumerate(ends):
         for method, planner in planners.items():

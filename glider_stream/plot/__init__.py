@@ -4,6 +4,7 @@ from .along import Along, along, placed
 from .canvas import check_figure, save_figure
 from .chart import plot_chart
 from .comparison import Mean, Series, plot_comparison
+from .departures import plot_departures
 from .fronts import Fronts, fronts_of
 from .page import PAGE, save_page
 from .roadmap import plot_roadmap
@@ -24,6 +25,7 @@ __all__ = [
     "placed",
     "plot_chart",
     "plot_comparison",
+    "plot_departures",
     "plot_roadmap",
     "plot_route",
     "plot_steering",

@@ -34,6 +34,10 @@ NO_CLOCK: dict[str, dict[str, Any]] = {
 }
 
 
+PASSING, STILL = ", as the route passes nearest", "FROZEN: all legs in the current of the departure"
+"""Of which time the currents of a figure are where the clock runs; what a figure says where it does not."""
+
+
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
     """The look of every figure, whatever matplotlibrc says; InputError where the extra is missing."""

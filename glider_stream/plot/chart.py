@@ -12,11 +12,23 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import Along, along
-from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
+from .canvas import (
+    GREY,
+    INK,
+    PASSING,
+    STILL,
+    colours,
+    frozen,
+    new_figure,
+    said_time,
+    said_when,
+    styled,
+    time_unit,
+)
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
 from .seabed import sample_bottom
-from .water import Frame, checked_depths, frame_of
+from .water import Frame, checked_depths, frame_of, passing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,15 +80,16 @@ def plot_chart(
         if path.departs is not None:
             arrives = path.departs + timedelta(seconds=path.travel_time)
             said += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
+        said += f"; {STILL}" if path.frozen else ""
         figure = new_figure(14.0, 8.6, f"{title}: {said}" if title else f"Route: {said}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
-        ax = left.add_subplot()
-        image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.55, arrows=22)
+        ax, at = left.add_subplot(), passing(path, problem.departure)
+        image = draw_current(ax, flow, terrain, frame, depth, at, pale=0.55, arrows=22)
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
-        when = said_when(is_steady(flow), problem.departure, problem.departs)
+        when = PASSING if path.clock_runs else said_when(is_steady(flow), problem.departure, problem.departs)
         every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])

@@ -55,7 +55,7 @@ def draw_roadmap(
 
 
 def draw_route(
-    road: Roadmap,
+    position: Array,
     problem: Problem,
     route: Path,
     output: str | File | None,
@@ -67,21 +67,22 @@ def draw_route(
 ) -> "Figure | None":
     """A route over maps of the current, by time on a chart, or as a page: then no figure is returned.
 
-    `arrivals` of a start (3,) [m]: when each node can be reached at the soonest [s], for `fronts` [h].
+    Among nodes `position` (n, 3) [m]; `arrivals` of a start (3,) [m]: when each node can be reached at the
+    soonest [s], for `fronts` [h].
     """
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
     here = bool(problem.evaluator.allowed(stops, problem.departure).all())
     require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
     if not chart and fronts is None and not is_page(output):
-        figure = plot_route(flow, terrain, problem, road.position, route, depths, title)
+        figure = plot_route(flow, terrain, problem, position, route, depths, title)
     else:
         route = placed(route, problem)
         every: tuple[Fronts, float] | None = None
         if fronts is not None:
-            every = fronts_of(road.position, arrivals(route.start), terrain), fronts
+            every = fronts_of(position, arrivals(route.start), terrain), fronts
         if output is not None and is_page(output):
-            save_page(output, flow, terrain, problem, road.position, route, depths, every, title)
+            save_page(output, flow, terrain, problem, position, route, depths, every, title)
             return None
         figure = plot_chart(flow, terrain, problem, route, depths, every, title)
     if output is not None:

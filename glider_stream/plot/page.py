@@ -22,11 +22,11 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import length_unit, said_time, said_when, thinned, time_unit
+from .canvas import PASSING, STILL, length_unit, said_time, said_when, thinned, time_unit
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import sample_bottom
-from .water import Frame, frame_of, sample_field
+from .water import Frame, Time, frame_of, passing, sample_field
 
 if TYPE_CHECKING:
     from ..roadmap.problem import Problem
@@ -67,7 +67,7 @@ def save_page(
         "box": [*frame.x, *frame.y],
         "unit": dict(zip(("size", "name"), length_unit(frame.x, frame.y), strict=True)),
         "lonlat": _lonlat(frame),
-        "current": _current(flow, frame, levels, problem.departure),
+        "current": _current(flow, frame, levels, passing(path, problem.departure)),
         "seabed": _seabed(terrain, frame),
         "legs": _legs(terrain, path),
         "fronts": None if fronts is None else _fronts(*fronts),
@@ -98,11 +98,11 @@ def page_text(held: dict[str, Any], title: str) -> str:
 
 def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str, Any]:
     unit, name = time_unit(path.travel_time)
-    when = said_when(is_steady(flow), problem.departure, problem.departs)
+    when = PASSING if path.clock_runs else said_when(is_steady(flow), problem.departure, problem.departs)
     legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
     return {
         "title": title or "Route",
-        "said": f"{legs}, {said_time(path.travel_time)}",
+        "said": f"{legs}, {said_time(path.travel_time)}" + (f"; {STILL}" if path.frozen else ""),
         "when": when,
         "time": {"size": unit, "name": name, "total": path.travel_time},
         "departs": None if path.departs is None else path.departs.timestamp() * 1e3,
@@ -125,10 +125,11 @@ def _lonlat(frame: Frame) -> dict[str, Any] | None:
     return {"points": LONLAT_POINTS, "lon": _numbers(lon, 6), "lat": _numbers(lat, 6)}
 
 
-def _current(flow: Flow, frame: Frame, depths: Array, t: float) -> dict[str, Any]:
+def _current(flow: Flow, frame: Frame, depths: Array, t: Time) -> dict[str, Any]:
     """The current in mm/s at cell centres, row by row from the south, for each depth."""
     x, y = frame.mesh(CURRENT_CELLS)
-    fields = [sample_field(flow, x, y, -depth, t) for depth in depths]
+    times = t(x, y) if callable(t) else t
+    fields = [sample_field(flow, x, y, -depth, times) for depth in depths]
     fastest = max(float(np.nanmax(np.hypot(u, v), initial=0.0)) for u, v in fields)
     return {
         "cells": [x.shape[1], x.shape[0]],

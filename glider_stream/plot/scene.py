@@ -10,7 +10,7 @@ from ..kernels.terrain import Terrain
 from .canvas import GREY, INK, colours, thinned
 from .graticule import draw_graticule
 from .seabed import ground_of
-from .water import Frame, sample_field, sample_water
+from .water import Frame, Time, sample_field, sample_water
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,18 +50,20 @@ def draw_current(
     terrain: Terrain,
     frame: Frame,
     depth: float,
-    t: float,
+    t: Time,
     pale: float = 0.15,
     arrows: int = 15,
 ) -> Any:
-    """The current at a depth [m] and time t [s]: speed as colour, direction as arrows; returns the image.
+    """The current at a depth [m] and time t [s], one or that of each place; returns the image.
+
+    Speed as colour, direction as arrows.
 
     `pale` is the share of white in the colours, `arrows` their number along the longer side.
     """
 
     def current(count: int) -> tuple[Array, Array, Array, Array]:
         x, y = frame.mesh(count)
-        u, v = sample_field(flow, x, y, -depth, t)
+        u, v = sample_field(flow, x, y, -depth, t(x, y) if callable(t) else t)
         wet = sample_water(terrain, x, y, -depth)
         return x / frame.unit, y / frame.unit, np.where(wet, u, np.nan), np.where(wet, v, np.nan)
 

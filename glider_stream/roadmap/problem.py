@@ -22,7 +22,9 @@ class Problem:
 
     `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
-    where known. `flow_words`, `glider_words` say what they are. `domain` is that of the scenario.
+    where known. `frozen`: queries take every leg as at the departure, though the flow changes; `bins` [s]:
+    queries keep ways to one node apart that arrive in different bins of time. `flow_words`, `glider_words` say
+    what they are. `domain` is that of the scenario.
     """
 
     evaluator: Evaluator
@@ -38,6 +40,8 @@ class Problem:
     glider_words: str
     to_lonlat: Callable[[Array], Array] | None = None
     departs: datetime | None = None
+    frozen: bool = False
+    bins: float | None = None
     domain: BoxDomain | GeographicDomain | None = None
 
     def check_point(self, point: Array, name: str) -> None:

@@ -9,9 +9,10 @@ from helpers.small import command, roadmap, scenario_file, strict_json
 
 from glider_stream.base.errors import InputError
 from glider_stream.scenario import read_scenario
+from glider_stream.search.layered import SurfacingPlanner
 from glider_stream.search.path import SURFACE
 from glider_stream.search.query import Planner
-from glider_stream.search.surfacing import BINS, LEAST_HOURS, Surfacing, SurfacingPlanner
+from glider_stream.search.surfacing import BINS, LEAST_HOURS, Surfacing
 
 
 def keeps(rule, legs, slack=0.0):

@@ -13,8 +13,9 @@ from glider_stream.kernels.edges import Status
 from glider_stream.roadmap.problem import Problem
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
+from glider_stream.search.layered import SurfacingPlanner
 from glider_stream.search.query import Planner
-from glider_stream.search.surfacing import Surfacing, SurfacingPlanner
+from glider_stream.search.surfacing import Surfacing
 from glider_stream.search.why_not import Looked, no_edges, outrun, why_not
 from glider_stream.water.analytic import Uniform
 
