@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -167,8 +167,8 @@ class Roadmap:
     threads: int
     lonlat: Array | None = None
     node_counts: NDArray[np.int32] | None = None
-    file: Path | None = None
-    elsewhere: tuple[str, ...] = ()
+    file: Path | None = field(default=None, compare=False)
+    elsewhere: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def evaluated(self) -> int:
