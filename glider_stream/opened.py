@@ -22,7 +22,7 @@ from .roadmap.builder import node_positions
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
-from .scenario import Scenario, read_scenario, scenario_from_text, shipped_scenarios
+from .scenario import Scenario, read_scenario, scenario_of, shipped_scenarios
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
@@ -324,7 +324,7 @@ class OpenedRoadmap(OpenedScenario):
         self._lock = RLock()
 
     def _read_scenario(self) -> Scenario:
-        return scenario_from_text(self.roadmap.provenance.scenario)
+        return scenario_of(self.roadmap)
 
     @property
     def _roadmap(self) -> Roadmap | None:
@@ -343,8 +343,11 @@ class OpenedRoadmap(OpenedScenario):
         return str(self.roadmap)
 
 
-def open(roadmap: str | File | Roadmap | OpenedRoadmap) -> OpenedRoadmap:
+def open(roadmap: str | File | Roadmap | OpenedRoadmap, overrides: Sequence[str] = ()) -> OpenedRoadmap:
     """Open a roadmap, from its file or as it was built, for any number of questions.
+
+    `overrides`, such as "flow.file=currents.nc", say where a file is now that its scenario reads; one that lies
+    beside the roadmap is found without.
 
     InputError where the file is not a roadmap, newer, incomplete or damaged.
 
@@ -354,6 +357,9 @@ def open(roadmap: str | File | Roadmap | OpenedRoadmap) -> OpenedRoadmap:
         Roadmap: 77 nodes, 929 edges
         ...
     """
+    if overrides:
+        before = open(roadmap)
+        return OpenedRoadmap(replace(before.roadmap, elsewhere=tuple(overrides)), before.title)
     if isinstance(roadmap, OpenedRoadmap):
         return roadmap
     if isinstance(roadmap, Roadmap):
@@ -369,12 +375,20 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
     return OpenedScenario(read_scenario(scenario, overrides), File(scenario).stem)
 
 
-def open_either(source: "str | File | Roadmap | Scenario | OpenedScenario") -> OpenedScenario:
-    """Open a roadmap, or a scenario: an object, a file that ends in .toml, or the name of a shipped one."""
+def open_either(
+    source: "str | File | Roadmap | Scenario | OpenedScenario", overrides: Sequence[str] = ()
+) -> OpenedScenario:
+    """Open a roadmap, or a scenario: an object, a file that ends in .toml, or the name of a shipped one.
+
+    `overrides` as `open` or `open_scenario` has them.
+    """
+    if isinstance(source, OpenedRoadmap):
+        return open(source, overrides)
     if isinstance(source, OpenedScenario):
+        require(not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}")
         return source
     if isinstance(source, Scenario):
-        return open_scenario(source)
+        return open_scenario(source, overrides)
     if not isinstance(source, Roadmap) and (File(source).suffix == ".toml" or str(source) in shipped_scenarios()):
-        return open_scenario(source)
-    return open(source)
+        return open_scenario(source, overrides)
+    return open(source, overrides)

@@ -24,7 +24,7 @@ from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
-from .scenario import Scenario, read_scenario, scenario_from_text
+from .scenario import Scenario, read_scenario
 from .search.path import Path
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
@@ -122,7 +122,7 @@ def _build(
         from .jobs.reuse import untouched
 
         road = info(older)
-        before = scenario_from_text(road.provenance.scenario).problem()
+        before = open_roadmap(older).problem
         check_unchanged(road, before)
         job["base"] = road, untouched(road, before, problem)
     if address is None:
@@ -309,8 +309,10 @@ def why_no_edges(roadmap: AnyRoadmap) -> str:
     return open_roadmap(roadmap).why_no_edges()
 
 
-def verify(roadmap: str | File, sample: int = 200) -> "Verification":
+def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":
     """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too.
+
+    `overrides` as `glider_stream.open` has them.
 
     Examples:
         >>> planner.verify("small.h5", sample=5).holds
@@ -318,7 +320,7 @@ def verify(roadmap: str | File, sample: int = 200) -> "Verification":
     """
     from .roadmap.verify import verify
 
-    return verify(roadmap, lambda text: scenario_from_text(text).problem(), sample)
+    return verify(roadmap, lambda road: open_roadmap(road, overrides).problem, sample)
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
@@ -341,6 +343,7 @@ def plot(
     *,
     chart: bool = False,
     fronts: float | None = None,
+    overrides: Sequence[str] = (),
 ) -> "Figure | None":
     """Draw a path over its roadmap or scenario, or the roadmap, as `OpenedRoadmap.plot` has it.
 
@@ -352,7 +355,7 @@ def plot(
     from .plot.draw import check_drawing
 
     check_drawing(output, path, depths, chart, fronts)  # before the roadmap is read
-    return open_either(roadmap).plot(path, output, depths, chart=chart, fronts=fronts)
+    return open_either(roadmap, overrides).plot(path, output, depths, chart=chart, fronts=fronts)
 
 
 def plot_routes(
@@ -360,6 +363,8 @@ def plot_routes(
     paths: Sequence[str | File] | Mapping[str, Path],
     output: str | File | None = None,
     depth: float | None = None,
+    *,
+    overrides: Sequence[str] = (),
 ) -> "Figure":
     """Draw two to four paths of one problem side by side; see `OpenedRoadmap.plot_routes`.
 
@@ -367,7 +372,7 @@ def plot_routes(
         >>> paths = {"near": planner.query("small.h5", goal=(0, 0, -150)), "far": planner.query("small.h5")}
         >>> figure = planner.plot_routes("small.h5", paths, "routes.png")
     """
-    return open_roadmap(roadmap).plot_routes(paths, output, depth)
+    return open_roadmap(roadmap, overrides).plot_routes(paths, output, depth)
 
 
 def plot_steering(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from datetime import UTC, date, datetime, timedelta
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,13 +14,15 @@ from .base.arrays import Array
 from .base.checks import FASTEST, LONGEST
 from .base.errors import InputError
 from .base.settings import from_kinds, from_table, require
-from .base.toml import to_toml
+from .base.toml import check_depth, to_toml
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
 from .roadmap.evaluator import Evaluator
+from .roadmap.inputs import KEYS, located, names_of, renamed
 from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
+from .roadmap.roadmap import Roadmap
 from .roadmap.steering import METHODS, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
@@ -29,7 +31,7 @@ from .vehicle.presets import glider_from_table
 from .water.analytic import FLOWS, AnalyticFlow
 from .water.domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .water.inspect import divergence_ratio, is_steady
-from .water.ocean import OceanFlow
+from .water.ocean import OceanFlow, parse_time
 from .water.ocean.bottom import Bottom
 from .water.sampled import sample_flow, sampling_error
 from .water.terrain import TerrainSettings, raster_terrain
@@ -50,7 +52,7 @@ OPTIONAL = ("terrain", "query")
 
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
-FILES = {"file", "bathymetry", "keep_out"}
+FILES = {key for keys in KEYS.values() for key in keys}
 """Keys whose values name files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
@@ -159,9 +161,8 @@ class Scenario:
         """When gliders leave, by the calendar, where the flow says when t = 0 is."""
         if not isinstance(self.flow, OceanFlow) or self.flow.epoch is None:
             return None
-        epoch = datetime.fromisoformat(self.flow.epoch.strip())
-        utc = epoch.replace(tzinfo=UTC) if epoch.tzinfo is None else epoch.astimezone(UTC)
-        return utc + timedelta(seconds=self.departure)
+        epoch = parse_time(self.flow.epoch, "`flow.epoch`").item()
+        return cast(datetime, epoch).replace(tzinfo=UTC) + timedelta(seconds=self.departure)
 
     def _waters(self, glide: float, horizon: float) -> tuple[Flow, Terrain, str]:
         """Flow and terrain; `glide` [m] is how far a glider gets in still water within the horizon [s]."""
@@ -260,16 +261,42 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as such") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"the scenario {name} is not valid TOML: {error}; mend that place") from None
+    check_depth(table, f"the scenario {name}")
     _override(table, overrides)
+    check_depth(table, "`--set`")
     return scenario_from_table(table, path.parent)
 
 
 def scenario_from_text(text: str) -> Scenario:
     """The scenario that a roadmap carries."""
     try:
-        return scenario_from_table(tomllib.loads(text), Path())
-    except tomllib.TOMLDecodeError as error:
+        table = tomllib.loads(text)
+        check_depth(table, "the roadmap's scenario")
+        return scenario_from_table(table, Path())
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"the roadmap's scenario is not valid TOML: {error}") from None
+
+
+def scenario_of(road: Roadmap) -> Scenario:
+    """The scenario that a roadmap carries, its files found again where they or the roadmap have moved."""
+    text = road.provenance.scenario
+    try:
+        table: dict[str, Any] = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return scenario_from_text(text)
+    check_depth(table, "the roadmap's scenario")
+    names, beside = names_of(table), Path() if road.file is None else road.file.absolute().parent
+    given: dict[str, tuple[str, ...]] = {}
+    for override in road.elsewhere:
+        place = override.partition("=")[0].strip()
+        choices = " or ".join(names) or "which has none"
+        require(place in names, f"`--set` names a file of the roadmap's scenario, {choices}; got {override!r}")
+        _set(table, override)
+        section, key = place.split(".")
+        table[section] |= _located({key: table[section][key]}, Path())
+        given[place] = names_of(table)[place]
+    asked = {place: some for place, some in names.items() if place not in given}
+    return scenario_from_table(renamed(table, located(asked, road.provenance.inputs, beside)), Path())
 
 
 def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
@@ -315,6 +342,10 @@ def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         names = table[key] if several else [table[key]]
         if isinstance(names, list) and all(isinstance(name, str) for name in names):
             found = [str((folder / name).absolute()) for name in names]
+            for name in found:
+                # a roadmap keeps it as text
+                utf_8 = not any("\ud800" <= letter <= "\udfff" for letter in name)
+                require(utf_8, f"`{key}` = {name!r} is a name that is not UTF-8; rename the file, or its folder")
             result[key] = found if several or key != "bathymetry" else found[0]
     return result
 

@@ -4,6 +4,26 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from .errors import InputError
+
+DEEPEST = 20
+"""Levels of tables and lists in a scenario; it needs four."""
+
+
+def check_depth(table: Mapping[str, Any], what: str) -> None:
+    """InputError where tables lie within tables so deep that nothing can be said of them."""
+    level: list[Any] = [table]
+    for _ in range(DEEPEST):
+        level = [
+            inner
+            for one in level
+            for inner in (one.values() if isinstance(one, Mapping) else one)
+            if isinstance(inner, (Mapping, list))
+        ]
+        if not level:
+            return
+    raise InputError(f"{what} holds tables within tables, more than {DEEPEST} deep; a key has one dot or two")
+
 
 def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
     """A nested table as TOML text: values first, then sub-tables, then lists of tables."""

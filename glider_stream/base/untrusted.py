@@ -1,6 +1,7 @@
 """Checks of packed files that may come from anyone, such as HDF5, before their data are read."""
 
 import math
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +15,16 @@ FREE = 50_000_000
 """A claim up to this size [bytes] is not compared with the size of the file."""
 MOST_OBJECTS = 10_000
 """No current file and no roadmap holds as many groups and datasets."""
+
+
+def check_file(path: str | Path, what: str) -> None:
+    """InputError where `what` is neither a file nor a folder: reading a pipe or a device may never end."""
+    try:
+        mode = Path(path).stat().st_mode
+    except (OSError, ValueError):
+        return  # who reads it says what is wrong
+    ordinary = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+    require(ordinary, f"{what} {path} is a pipe or a device, and no file; save it as a file first")
 
 
 def check_claim(file: str | Path, name: str, shape: Sequence[int], itemsize: int, held: int) -> None:
@@ -57,6 +68,16 @@ def check_links(path: str | Path) -> None:
                         inside,
                         f"the data of `{name}` in {path} lie in other files, which are not read: copy them in",
                     )
+                    _check_storage(path, name, item)
+
+
+def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
+    """InputError where a dataset is of lists, whose lengths may be anything, or larger than it can be."""
+    inner = h5py.check_vlen_dtype(dataset.dtype)
+    even = inner is None or inner in (str, bytes)
+    require(even, f"`{name}` in {path} holds lists of uneven lengths, which are not read: write plain numbers")
+    if dataset.shape is not None and inner is None:
+        check_claim(path, f"`{name}`", dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
 
 
 def groups_of(path: str | Path) -> tuple[list[str], set[str]]:

@@ -24,6 +24,7 @@ from ..base.output import replacing
 from ..base.settings import require
 from ..base.threads import in_parallel, threads
 from ..base.toml import to_toml
+from ..base.untrusted import check_file
 from ..kernels.cache import KERNEL_DIGEST, entry_point
 from ..kernels.control import control_of
 from ..kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
@@ -31,7 +32,7 @@ from ..kernels.motion import LANE_X, LANE_Y, LANES
 from ..kernels.place import Place
 from ..roadmap.builder import find_edges, node_positions, warm_up
 from ..roadmap.store import read_roadmap
-from ..scenario import read_scenario, scenario_from_text
+from ..scenario import read_scenario, scenario_of
 from ..search.query import Planner
 from ..water.sampled import sample_flow
 
@@ -279,7 +280,7 @@ def sizes(runs: int, quick: bool) -> Iterator[Figure]:
             first = tuple(_process("query", file)[0] for _ in range(5))
             yield Figure(f"{name}: first query, whole process", "s", first, False)
             began = time.perf_counter()
-            problem = scenario_from_text(road.provenance.scenario).problem()
+            problem = scenario_of(road).problem()
             sampled = time.perf_counter() - began
             yield Figure(f"{name}: of it, sampling the flow", "s", (sampled,), False)
             planner, rng, half = Planner(road, problem), np.random.default_rng(1), 0.9 * problem.hi[0]
@@ -345,6 +346,7 @@ def _said(value: float) -> str:
 def read_record(file: str | Path) -> dict[str, Any]:
     """A record that `bench --json` wrote; InputError where it is not one."""
     try:
+        check_file(file, "the record")
         record = json.loads(Path(file).read_text(encoding="utf-8"))
         for figure in record["figures"]:
             sound = isinstance(figure["name"], str) and figure["low"] <= figure["median"] <= figure["high"]

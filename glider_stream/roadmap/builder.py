@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,6 +138,7 @@ def build_roadmap(
             parts.append(edges)
             progress(tally.add(edges))
     whole = in_order(parts)
+    values: dict[str, Any] = {n: np.ascontiguousarray(whole.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
     return Roadmap(
         position=position,
         indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
@@ -147,5 +149,5 @@ def build_roadmap(
         wall_s=tally.seconds,
         threads=used,
         node_counts=whole.counts,
-        **{name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)},
+        **values,
     )

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.settings import require
+from ..base.terminal import plain
 from .roadmap import EDGE_FIELDS, Roadmap
 
 WORDS = {
@@ -62,7 +63,7 @@ class Difference:
             for name, (first, second) in self.made.items()
         ]
         for mark, lines_of_one in zip("<>", self.scenario, strict=True):
-            lines += [f"{mark} {line}" for line in lines_of_one[:MOST_LINES]]
+            lines += [f"{mark} {plain(line)}" for line in lines_of_one[:MOST_LINES]]
             more = len(lines_of_one) - MOST_LINES
             lines += [f"{mark} ... {more} lines more"] if more > 0 else []
         if self.edges is None or self.times is None:

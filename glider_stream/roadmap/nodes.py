@@ -17,6 +17,8 @@ Allowed = Callable[[Array], NDArray[np.bool_]]
 
 MOST_NODES = 10_000_000
 """A roadmap with more nodes does not fit into memory."""
+MOST_DRAWN = 4 * MOST_NODES
+"""Points that are drawn in search of open water, at most: they are held at once."""
 
 
 class Sampler(Protocol):
@@ -41,6 +43,9 @@ class GridSampler:
 
     def __post_init__(self) -> None:
         require(min(self.shape) >= 1, f"`sampling.shape` must be at least 1 each way; got {list(self.shape)}")
+        size = math.prod(self.shape)
+        fits = size <= MOST_NODES
+        require(fits, f"`sampling.shape` = {list(self.shape)} is {size:,} nodes; take at most {MOST_NODES:,}")
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
         """Points (n, 3) [m] in the box lo..hi: x varies slowest, z fastest, from the surface down."""
@@ -60,7 +65,8 @@ class RandomSampler:
     seed: int
 
     def __post_init__(self) -> None:
-        require(self.count >= 1, f"`sampling.count` must be at least 1; got {self.count}")
+        fits = 1 <= self.count <= MOST_NODES
+        require(fits, f"`sampling.count` must be from 1 to {MOST_NODES:,}; got {self.count:,}")
         require(self.seed >= 0, f"`sampling.seed` must be at least 0; got {self.seed}")
 
     def draw(self, count: int) -> Array:
@@ -77,7 +83,7 @@ class RandomSampler:
                 return points[: self.count]
             drawn *= 2
             require(
-                drawn <= 256 * self.count,
+                drawn <= min(256 * self.count, MOST_DRAWN),
                 f"only {len(points)} of {drawn // 2} points drawn lie in open water, `sampling.count` = "
                 f"{self.count} needs more; move the domain off the land",
             )

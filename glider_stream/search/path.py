@@ -14,6 +14,7 @@ from ..base.arrays import Array
 from ..base.clock import moment, span
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
 
 MOST_TEXT = 200_000_000
@@ -210,6 +211,7 @@ def load_path(file: str | File) -> Path:
     try:
         size = File(file).stat().st_size
         require(size <= MOST_TEXT, f"it holds {size:,} bytes, more than a path needs ({MOST_TEXT:,})")
+        check_file(file, "the path")
         table = json.loads(File(file).read_text(encoding="utf-8"))
         require(isinstance(table, dict) and isinstance(table.get("legs"), list), "it has no list `legs`")
         require(len(table["legs"]) > 0, "it holds no leg, so there is nothing to draw")

@@ -1,6 +1,7 @@
 """Recorded dives, out of a CSV file."""
 
 import csv
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,7 +89,8 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
         # the two speeds are the glide angle
         found.pop("glide_angle", None)
     line = np.array([number for number, _ in rows], np.int64)
-    cells = {what: [row[header.index(column)] for _, row in rows] for what, column in found.items()}
+    at = {column: n for n, column in enumerate(header)}
+    cells = {what: [row[at[column]] for _, row in rows] for what, column in found.items()}
     values = {}
     for what, column in found.items():
         if what != "phase":
@@ -140,8 +142,8 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path.name} cannot be read as CSV: {error}; save it as such") from None
     require(len(rows) > 0, f"{path.name} must hold a header and dives, a line each; got none")
-    for name in header:
-        require(header.count(name) == 1, f"{path.name} has more than one column `{name}`; rename one")
+    for name, times in Counter(header).items():
+        require(times == 1, f"{path.name} has more than one column `{name}`; rename one")
     return header, rows
 
 
