@@ -314,6 +314,13 @@ class OpenedRoadmap(OpenedScenario):
     """A roadmap and what its questions need, as `OpenedScenario`; `roadmap` is its data.
 
     InputError at the first question where flow, terrain or glider are no longer those that it was built with.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> road.query().found
+        True
+        >>> road.problem is road.problem
+        True
     """
 
     def __init__(self, roadmap: Roadmap, title: str = "") -> None:
@@ -336,7 +343,12 @@ class OpenedRoadmap(OpenedScenario):
         return self.roadmap.position
 
     def why_no_edges(self) -> str:
-        """Why it holds no edge, in a sentence; empty where it holds some."""
+        """The reason, in a sentence, if the roadmap has no edge; empty if it has some.
+
+        Examples:
+            >>> road.why_no_edges()
+            ''
+        """
         return "" if self.roadmap.target.size else no_edges(self.roadmap, self.problem)
 
     def __str__(self) -> str:

@@ -231,7 +231,13 @@ def plan(
     *,
     overrides: Sequence[str] = (),
 ) -> Path:
-    """The cheapest path of a scenario without a roadmap; all else as in `query`."""
+    """The cheapest path of a scenario without a roadmap; all else as in `query`.
+
+    Examples:
+        >>> path = planner.plan("small.toml", (-190, 190, 0), (100, -100, -75))
+        >>> path.found
+        True
+    """
     for output in outputs:
         check_export(output)
     return open_scenario(scenario, overrides).query(
