@@ -1,6 +1,6 @@
 """An opened roadmap: roadmap, problem and searches, each made once, when it is first needed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as File
 from threading import RLock
@@ -23,7 +23,7 @@ from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.slices import SlicedRoadmap
 from .roadmap.store import read_any_roadmap
-from .scenario import Scenario, read_scenario, scenario_from_text
+from .scenario import Scenario, read_scenario, scenario_of, shipped_scenarios
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
@@ -115,6 +115,11 @@ class OpenedScenario:
         another rule. `surfacing` is a rule for how often to come up; the scenario's own if None. Exported
         windows last `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within
         `arrival_radius` [m], each vehicle's usual one if None; `notes` of the path say what else became of files.
+
+        Examples:
+            >>> path = road.query((-190, 190, 0), (100, -100, -75), thin=20)
+            >>> len(path.legs), round(path.travel_time)
+            (3, 430)
         """
         for output in outputs:
             check_export(output)
@@ -131,28 +136,55 @@ class OpenedScenario:
         return replace(path, notes=(*path.notes, *notes))
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none."""
+        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none.
+
+        Examples:
+            >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
+            array([[430., 382.]])
+        """
         free = self.planner(Surfacing())
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
     def arrivals(self, start: Point | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot.
+
+        Examples:
+            >>> int((road.arrivals() < 300).sum())
+            18
+        """
         return self.planner(Surfacing()).arrivals(None if start is None else self._point(start))
 
     def trade_off(
         self, start: Point | None = None, goal: Point | None = None, *, surfacing: Surfacing | None = None
     ) -> TradeOff:
-        """Every path of one query that no other beats both in time and in energy; all else as in `query`."""
+        """Every path of one query that no other beats both in time and in energy; all else as in `query`.
+
+        Examples:
+            >>> energy = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
+            >>> [len(path.legs) for path in glider_stream.open(energy).trade_off().paths]
+            [4]
+        """
         return front(self.planner(surfacing), self._ends(start, goal))
 
     def card(self, path: Path) -> Card:
-        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
+        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+
+        Examples:
+            >>> print(road.card(road.query()))  # doctest: +ELLIPSIS
+            leg   hours  over ground ...
+            ...
+        """
         return card_of(path, self.problem)
 
     def score(self, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
         """Fly a drawn route (CSV, GeoJSON, KML, GPX, a path file, goto lists, targets) in the roadmap's water.
 
         Several files are one route, one after another. `start` is where the vehicle is, before its first point.
+
+        Examples:
+            >>> _ = road.query(outputs=["path.json"])
+            >>> road.score("path.json").flyable
+            True
         """
         files = [route] if isinstance(route, str | File) else list(route)
         drawn = [read_drawn(file) for file in files]
@@ -235,6 +267,9 @@ class OpenedScenario:
         A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path
         by time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written
         where `output` says; one that ends in .html is a page to look around in, and no figure is returned.
+
+        Examples:
+            >>> figure = road.plot(road.query(), "route.png", depths=[0, 75])
         """
         from .plot.draw import check_drawing, draw_roadmap, draw_route
 
@@ -252,11 +287,44 @@ class OpenedScenario:
         how = output, depths, chart, fronts, free.arrivals
         return draw_route(self.position, self.problem, route, *how, self.title)
 
+    def plot_routes(
+        self,
+        paths: Sequence[str | File] | Mapping[str, Path],
+        output: str | File | None = None,
+        depth: float | None = None,
+    ) -> "Figure":
+        """Draw two to four paths of this water side by side, with their times, over the current at a `depth` [m].
+
+        `paths` are path files, which are called by their names without the ending, or paths by name. Without
+        a `depth` the middle of the box is drawn. The figure is written where `output` says.
+
+        Examples:
+            >>> paths = {"near": road.query(goal=(0, 0, -150)), "far": road.query()}
+            >>> figure = road.plot_routes(paths, "routes.png", depth=75)
+        """
+        from .plot.draw import check_drawing, draw_routes
+
+        check_drawing(output, None, None, False, None)
+        routes = (
+            dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_path(path) for path in paths}
+        )
+        named = f"each path needs a name of its own; got {', '.join(map(str, paths))}; rename a file"
+        require(len(routes) == len(paths), named)
+        self.planner(Surfacing())  # which compares the water with the roadmap's
+        return draw_routes(self.position, self.problem, routes, output, depth)
+
 
 class OpenedRoadmap(OpenedScenario):
     """A roadmap and what its questions need, as `OpenedScenario`; `roadmap` is its data.
 
     InputError at the first question where flow, terrain or glider are no longer those that it was built with.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> road.query().found
+        True
+        >>> road.problem is road.problem
+        True
     """
 
     def __init__(self, roadmap: Roadmap | SlicedRoadmap, title: str = "") -> None:
@@ -267,7 +335,7 @@ class OpenedRoadmap(OpenedScenario):
         self._lock = RLock()
 
     def _read_scenario(self) -> Scenario:
-        return scenario_from_text(self.roadmap.provenance.scenario)
+        return scenario_of(self.roadmap)
 
     @property
     def _roadmap(self) -> Roadmap | SlicedRoadmap | None:
@@ -279,7 +347,12 @@ class OpenedRoadmap(OpenedScenario):
         return self.roadmap.position
 
     def why_no_edges(self) -> str:
-        """Why it holds no edge, in a sentence; empty where it holds some."""
+        """The reason, in a sentence, if the roadmap has no edge; empty if it has some.
+
+        Examples:
+            >>> road.why_no_edges()
+            ''
+        """
         if self.roadmap.target.size:
             return ""
         one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
@@ -289,11 +362,25 @@ class OpenedRoadmap(OpenedScenario):
         return str(self.roadmap)
 
 
-def open(roadmap: str | File | Roadmap | SlicedRoadmap | OpenedRoadmap) -> OpenedRoadmap:
+def open(
+    roadmap: str | File | Roadmap | SlicedRoadmap | OpenedRoadmap, overrides: Sequence[str] = ()
+) -> OpenedRoadmap:
     """Open a roadmap, from its file or as it was built, for any number of questions.
 
+    `overrides`, such as "flow.file=currents.nc", say where a file is now that its scenario reads; one that lies
+    beside the roadmap is found without.
+
     InputError where the file is not a roadmap, newer, incomplete or damaged.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> print(road)  # doctest: +ELLIPSIS
+        Roadmap: 77 nodes, 929 edges
+        ...
     """
+    if overrides:
+        before = open(roadmap)
+        return OpenedRoadmap(replace(before.roadmap, elsewhere=tuple(overrides)), before.title)
     if isinstance(roadmap, OpenedRoadmap):
         return roadmap
     if isinstance(roadmap, Roadmap | SlicedRoadmap):
@@ -309,12 +396,22 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
     return OpenedScenario(read_scenario(scenario, overrides), File(scenario).stem)
 
 
-def open_either(source: "str | File | Roadmap | SlicedRoadmap | Scenario | OpenedScenario") -> OpenedScenario:
-    """Open a roadmap, or a scenario where an object, or a file that ends in .toml, is one."""
+def open_either(
+    source: "str | File | Roadmap | SlicedRoadmap | Scenario | OpenedScenario", overrides: Sequence[str] = ()
+) -> OpenedScenario:
+    """Open a roadmap, or a scenario: an object, a file that ends in .toml, or the name of a shipped one.
+
+    `overrides` as `open` or `open_scenario` has them.
+    """
+    if isinstance(source, OpenedRoadmap):
+        return open(source, overrides)
     if isinstance(source, OpenedScenario):
+        require(not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}")
         return source
     if isinstance(source, Scenario):
-        return open_scenario(source)
-    if isinstance(source, Roadmap | SlicedRoadmap) or File(source).suffix != ".toml":
-        return open(source)
-    return open_scenario(source)
+        return open_scenario(source, overrides)
+    if isinstance(source, Roadmap | SlicedRoadmap):
+        return open(source, overrides)
+    if File(source).suffix == ".toml" or str(source) in shipped_scenarios():
+        return open_scenario(source, overrides)
+    return open(source, overrides)

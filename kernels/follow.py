@@ -90,8 +90,8 @@ MOST_TRIES = 3
 """Guesses out of its neighbours that are flown for a target."""
 FURTHEST = 1.0
 """A neighbour's guess that is turned further [rad] is none."""
-BEYOND = 0.05
-"""A guess so far [rad] beyond the glide polar's end is flown from its end."""
+BEYOND, BENT = 0.02, 0.5
+"""A guess so far [rad] beyond the glide polar's end is flown from its end, and BENT times its turn squared."""
 SPREADS = 1.05
 """A neighbour's guess that may arrive later, in times of the slowest edge, is none."""
 HELD = 1.1
@@ -305,7 +305,8 @@ def _neighbours_guess(polar, position, z_p, leg, over_x, over_y, r, guess):
     turn_h = -(leg[LEG_INVERSE + 2] * off_x + leg[LEG_INVERSE + 3] * off_y)
     turn = max(abs(turn_a), abs(turn_h))
     low, high = polar.shallowest[direction], polar.steepest[direction]
-    if not turn < FURTHEST or angle + turn_a < low - BEYOND or angle + turn_a > high + BEYOND:
+    beyond = BEYOND + BENT * turn * turn
+    if not turn < FURTHEST or angle + turn_a < low - beyond or angle + turn_a > high + beyond:
         return math.inf
     angle = min(max(angle + turn_a, low), high)
     for m in range(FOLLOWED_COLUMNS):  # not a slice, which makes a copy

@@ -1,5 +1,6 @@
 """Jobs: builds that survive their process, in parts, on what an older roadmap holds, and on a cluster."""
 
+import heapq
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -11,13 +12,13 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Index
 from ..base.errors import InputError, Stopped, Unwritable
 from ..base.lock import locked
-from ..base.output import check_output
+from ..base.output import check_output, remove_abandoned
 from ..base.settings import require
 from ..base.threads import threads
 from ..roadmap.builder import BATCH_PAIRS, Progress, Tally, find_edges, node_positions, warm_up
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
-from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
+from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, by_node, in_order
 from ..roadmap.shard import Shard
 from ..roadmap.slices import SlicedRoadmap, rows_of
 from ..roadmap.step_error import StepSample
@@ -74,13 +75,16 @@ def build_file(
     check_output(path)
     target = path.resolve()  # a link stays one
     with locked(target):
-        for left in target.parent.glob(f".{_literal(target.name)}.*{_literal(target.suffix)}"):
-            left.unlink(missing_ok=True)  # by a build that was killed in its last moment
+        remove_abandoned(target)
         position = node_positions(problem)
-        made = provenance_of(problem, position)
+        made = provenance_of(problem, position, target.parent)
         shard = job.shard or Shard(1, 1)
-        identity = {**made.identity(), "shard": str(shard), "nodes": len(position)}
-        rows = len(position) * len(problem.departures)
+        nodes = np.arange(*shard.nodes(len(position)))
+        slices = len(problem.departures)
+        rows = rows_of(nodes, slices)
+        old = _taken_over(job, rows, slices)
+        # what a base gave is no part of the records, so none of them fits another base, or none
+        identity = {**made.identity(), "shard": str(shard), "nodes": len(position), "base": old.digest()}
         journal_path = target.with_name(f"{target.name}.journal")
         kept = ""
         try:
@@ -89,9 +93,9 @@ def build_file(
                 threads(thread_count) as used,
             ):
                 try:
-                    _run(problem, position, made, path, journal, shard, job, used, progress, batch_pairs)
+                    _run(problem, position, made, path, journal, shard, old, job, used, progress, batch_pairs)
                 finally:
-                    done = int(journal.done.sum()) * len(position) // rows
+                    done = int(journal.done.sum()) // slices
                     kept = f"{done:,} of {len(position):,} nodes are kept in {journal_path.name}"
         except KeyboardInterrupt:
             raise Stopped(f"stopped; {kept}: give the same command again to go on") from None
@@ -105,11 +109,6 @@ def build_file(
             raise InputError(f"the output {path} cannot be written whole: {reason}; {room}{more}") from None
 
 
-def _literal(name: str) -> str:
-    """A name as a pattern that matches it alone."""
-    return re.sub(r"([*?[])", r"[\1]", name)
-
-
 def _run(
     problem: Problem,
     position: Array,
@@ -117,6 +116,7 @@ def _run(
     path: Path,
     journal: Journal,
     shard: Shard,
+    old: Edges,
     job: Job,
     used: int,
     progress: Callable[[Progress], None],
@@ -125,10 +125,9 @@ def _run(
     slices = len(problem.departures)
     nodes = np.arange(*shard.nodes(len(position)))
     tally, sample = Tally(len(nodes) * slices, used), StepSample(len(position))
-    old = _taken_over(job, rows_of(nodes, slices), slices)
     # legs of one departure tell how fine the steps are
     one, of_one = replace(problem, slices=()), slices == 1
-    if old is not None:
+    if old.source.size:
         tally.add(old)
         if of_one:
             sample.take(old)
@@ -138,10 +137,10 @@ def _run(
             sample.take(edges)
     made = sample.checked(made, one, position, lambda some: job.finder(one, position, some, batch_pairs))
     known = journal.done.copy()
-    if old is not None:
-        known[old.source] = True
-    done = known[nodes * slices]  # a node's departures are found together
-    waiting = nodes[~done]
+    twice = known[old.source].any()
+    require(not twice, f"{journal.path} holds nodes that --from has right; begin anew with --restart")
+    known[old.source] = True
+    waiting = nodes[~known[nodes * slices]]  # a node's departures are found together
     if waiting.size:
         if job.warm:
             warm_up(problem)
@@ -150,15 +149,21 @@ def _run(
             progress(tally.add(edges))
     departures = np.array(problem.departures) if slices > 1 else None
     with writing(path, position, lonlat_of(problem, position), made, shard, departures) as file:
-        _write(file.append, old, journal.records())
+        for edges in by_node(heapq.merge([old], journal.records(), key=_first)):
+            file.append(edges)
         file.finish(tally)
     journal.remove()
 
 
-def _taken_over(job: Job, rows: Index, slices: int) -> Edges | None:
+def _first(edges: Edges) -> int:
+    """The first node that edges leave, -1 where there is none."""
+    return int(edges.source[0]) if edges.source.size else -1
+
+
+def _taken_over(job: Job, rows: Index, slices: int) -> Edges:
     """Of some rows of edges, those of the nodes that an older roadmap has right."""
     if job.base is None:
-        return None
+        return in_order([])
     road, nodes = job.base
     counts = road.row_counts if isinstance(road, SlicedRoadmap) else road.node_counts
     assert counts is not None
@@ -168,20 +173,6 @@ def _taken_over(job: Job, rows: Index, slices: int) -> Edges | None:
     mine = np.zeros(len(right), dtype=bool)
     mine[rows] = True
     return every.of(right & mine)
-
-
-def _write(append: Callable[[Edges], None], old: Edges | None, records: Iterator[Edges]) -> None:
-    """Hand over all edges in the order of their nodes."""
-    if old is None:
-        for edges in records:
-            append(edges)
-        return
-    first = 0
-    for edges in records:
-        last = int(edges.source[-1])
-        append(in_order([edges, old.of((old.source >= first) & (old.source <= last))]))
-        first = last + 1
-    append(old.of(old.source >= first))
 
 
 def merge(parts: Sequence[str | Path], output: str | Path) -> None:

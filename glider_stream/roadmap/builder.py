@@ -138,7 +138,13 @@ def build_roadmap(
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
 ) -> Roadmap:
-    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk."""
+    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk.
+
+    Examples:
+        >>> problem = glider_stream.read_scenario("small.toml").problem()
+        >>> glider_stream.build_roadmap(problem).target.size
+        929
+    """
     require(len(problem.departures) == 1, "a roadmap of several departures is built by `build_slices`")
     return build_slices(problem, thread_count, progress, batch_pairs).at(0)
 
@@ -166,9 +172,7 @@ def build_slices(
             parts.append(edges)
             progress(tally.add(edges))
     whole = in_order(parts)
-    values: dict[str, Any] = {
-        name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)
-    }
+    values: dict[str, Any] = {n: np.ascontiguousarray(whole.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
     return SlicedRoadmap(
         departures=np.array(problem.departures),
         position=position,

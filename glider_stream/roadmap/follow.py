@@ -22,6 +22,8 @@ from .steering import FlowMapMethod
 
 FAN_EVERY = 12
 """Every so many slices a fan looks for all legs again; between, they are followed."""
+FEW = 48
+"""A node that has fewer legs gets a fan each time: their targets lie so far apart that none leads to the next."""
 BESIDE, ABOVE = 8, 1
 """Nodes near each, to which its legs lead on: on its depth, and on the next depth above and below."""
 ROOM = 1.25
@@ -77,6 +79,7 @@ class Follower:
     position: Array
     near: Index
     fan_every: int = FAN_EVERY
+    few: int = FEW
 
     @staticmethod
     def of(problem: Problem, position: Array) -> "Follower":
@@ -90,16 +93,20 @@ class Follower:
         before = 0.0
         for number, departure in enumerate(self.problem.departures):
             legs = replace(self.problem, departure=departure).legs(self.position)
-            if (
-                not isinstance(legs, NeighbourLegs | ReachableLegs)
-                or held is None
-                or not exact
-                or number % self.fan_every == 0
-            ):
+            by_fan = np.ones(len(source), bool)
+            if isinstance(legs, NeighbourLegs | ReachableLegs) and held is not None and exact:
+                by_fan = (held.counts < self.few) | (number % self.fan_every == 0)
+            if by_fan.all():
                 found = legs.of(source)
                 held = _held(found)
             else:
-                found, held = self._follow(legs, source, departure, departure - before, held)
+                assert isinstance(legs, NeighbourLegs | ReachableLegs)
+                assert held is not None
+                rest = Held(held.rows[~by_fan], held.counts[~by_fan])
+                found, held = self._follow(legs, source[~by_fan], departure, departure - before, rest)
+                if by_fan.any():
+                    fans = legs.of(source[by_fan])
+                    found, held = _joined(by_fan, fans, found), _side_by_side(by_fan, _held(fans), held)
             before = departure
             yield found
 
@@ -166,3 +173,24 @@ def _packed(rows: Array, kept: Bools) -> Held:
     packed = np.zeros((len(rows), int(counts.max(initial=0)), rows.shape[2]))
     packed[np.arange(packed.shape[1]) < counts[:, None]] = rows[kept]
     return Held(packed, counts)
+
+
+def _joined(chosen: Bools, one: Found, other: Found) -> Found:
+    """The pairs of the `chosen` nodes and of the others, in the order of the nodes."""
+    degree = np.empty(chosen.size, np.int64)
+    degree[chosen], degree[~chosen] = np.diff(one.indptr), np.diff(other.indptr)
+    mine = np.repeat(chosen, degree)
+    target, outcomes = np.empty(mine.size, np.int64), np.empty((mine.size, EDGE_COLUMNS))
+    target[mine], target[~mine] = one.target, other.target
+    outcomes[mine], outcomes[~mine] = one.outcomes, other.outcomes
+    return Found(np.concatenate([[0], np.cumsum(degree)]), target, outcomes)
+
+
+def _side_by_side(chosen: Bools, one: Held, other: Held) -> Held:
+    """The legs of the `chosen` nodes and of the others, in the order of the nodes."""
+    room = max(one.rows.shape[1], other.rows.shape[1])
+    rows, counts = np.zeros((chosen.size, room, follow.FOLLOWED_COLUMNS)), np.empty(chosen.size, np.int64)
+    for where, part in ((chosen, one), (~chosen, other)):
+        counts[where] = part.counts
+        rows[np.flatnonzero(where), : part.rows.shape[1]] = part.rows
+    return Held(rows, counts)

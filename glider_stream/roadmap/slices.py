@@ -1,6 +1,7 @@
 """The roadmap of many departures: slices of edges over the same nodes."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,8 @@ class SlicedRoadmap:
     threads: int
     lonlat: Array | None = None
     row_counts: NDArray[np.int32] | None = None
+    file: Path | None = field(default=None, compare=False)
+    elsewhere: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def evaluated(self) -> int:
@@ -69,6 +72,8 @@ class SlicedRoadmap:
             threads=self.threads,
             lonlat=self.lonlat,
             node_counts=None if self.row_counts is None else self.row_counts[rows],
+            file=self.file,
+            elsewhere=self.elsewhere,
             **values,
         )
 

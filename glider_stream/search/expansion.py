@@ -136,9 +136,7 @@ class ClockExpansion:
         rows = self.problem.evaluator.connect(points, departs, np.arange(place.size), indptr, place.size + to)
         for n in map(int, np.flatnonzero(ask.any(axis=1))):
             here, new = result[n], slice(indptr[n], indptr[n + 1])
-            result[n] = Fan(
-                np.concatenate([here.target, goals[to[new]]]), np.concatenate([here.rows, rows[new]])
-            )
+            result[n] = Fan(np.concatenate([here.target, goals[to[new]]]), np.concatenate([here.rows, rows[new]]))
 
 
 def _kept(fan: Fan, departure: float, last: float) -> Fan:
@@ -146,4 +144,3 @@ def _kept(fan: Fan, departure: float, last: float) -> Fan:
     with np.errstate(invalid="ignore"):
         fits = (fan.rows[:, STATUS] == Status.CONNECTED) & (departure + fan.rows[:, TIME] <= last)
     return Fan(fan.target[fits], fan.rows[fits])
-

@@ -109,9 +109,7 @@ class LabelSearch:
         self.is_goal[goals] = True
         self.inflection = cost.inflection(places[:, 2])
         self.per_second, self.per_leg = cost.kernel()
-        self.priced = self.inflection is not None and (
-            aim.by_cost or aim.front or math.isfinite(aim.cost_below)
-        )
+        self.priced = self.inflection is not None and (aim.by_cost or aim.front or math.isfinite(aim.cost_below))
         self.left = self.cost_left = np.zeros(len(places))
         if goals.size:
             self.left, self.cost_left = bound.remaining(goals, cost)
@@ -259,6 +257,9 @@ class LabelSearch:
         criteria = self._criteria(to, time, cost, ~climbs, half, surfaced)
         fits &= ~_any_beats(self.best[to], criteria)
         for n in np.flatnonzero(fits):
+            # a fan may hold two legs to one place: its own, and that from end to end
+            if np.all(self.best[to[n]] <= criteria[n], axis=1).any():
+                continue
             new = Label(
                 int(to[n]), float(time[n]), float(cost[n]), not climbs[n], int(half[n]), float(surfaced[n]),
                 number, rows[n],

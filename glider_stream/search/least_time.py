@@ -157,9 +157,7 @@ def _of_grid(
     span = max(float(np.abs(there - near).max()) for there in moved)
     width = 2 * (math.ceil(span) + 1) + 1
     wide: Array = maximum_filter(known, (1, width, width))
-    i, j = (
-        np.clip(np.round(near[n]).astype(np.int64), 0, flow.values.shape[2 + n] - 1) for n in range(2)
-    )
+    i, j = (np.clip(np.round(near[n]).astype(np.int64), 0, flow.values.shape[2 + n] - 1) for n in range(2))
     return np.minimum(wide[:, i, j], flow.extent.max_speed)
 
 

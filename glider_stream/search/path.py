@@ -14,6 +14,7 @@ from ..base.arrays import Array
 from ..base.clock import moment, span
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
 
 MOST_TEXT = 200_000_000
@@ -35,6 +36,13 @@ class Leg:
     `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
     Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
     trajectory, and `north` [rad], true north counter-clockwise from the frame's +y. `cost`: its own.
+
+    Examples:
+        >>> leg = road.query().legs[0]
+        >>> bool(leg.end[2] < leg.start[2]), leg.glide_angle < 0
+        (True, True)
+        >>> round(leg.compass, 1)
+        137.5
     """
 
     start: Array
@@ -93,6 +101,13 @@ class Path:
     begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
     `expanded`: the share of the nodes from which the search looked for legs, where it did.
     `unthinned`: how many legs and seconds it had before it was thinned.
+
+    Examples:
+        >>> path = road.query()
+        >>> path.found, len(path.legs), path.unit
+        (True, 4, 's')
+        >>> path.trajectory.shape[1]
+        4
     """
 
     start: Array
@@ -196,6 +211,7 @@ def load_path(file: str | File) -> Path:
     try:
         size = File(file).stat().st_size
         require(size <= MOST_TEXT, f"it holds {size:,} bytes, more than a path needs ({MOST_TEXT:,})")
+        check_file(file, "the path")
         table = json.loads(File(file).read_text(encoding="utf-8"))
         require(isinstance(table, dict) and isinstance(table.get("legs"), list), "it has no list `legs`")
         require(len(table["legs"]) > 0, "it holds no leg, so there is nothing to draw")

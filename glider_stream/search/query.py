@@ -69,7 +69,13 @@ class _Search:
 
 
 class Planner(RoutePlanner):
-    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is."""
+    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is.
+
+    Examples:
+        >>> planner = glider_stream.Planner(road.roadmap, road.problem)
+        >>> planner.query(np.array([-190.0, 190.0, 0.0]), np.array([100.0, -100.0, -75.0])).found
+        True
+    """
 
     def __init__(
         self,
@@ -143,10 +149,10 @@ class Planner(RoutePlanner):
         if not found:
             return TradeOff((self.assembly.no_path(begin.point, end.point),))
         return TradeOff(tuple(self._path(begin.point, end.point, search.hops(n)) for n in found))
+
     def _reached(self, start: Array) -> tuple[Array, Array]:
         """The nodes' places (n, 3) [m], and when each can be reached from a start at the soonest (n,) [s]."""
         return self.roadmap.position, self.arrivals(start)
-
 
     def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
         """As RoutePlanner."""

@@ -6,17 +6,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array, Index
+from ..base.checks import LONGEST
 from ..base.settings import require
 from .path import SURFACE, Path
 
 BINS = 48
 """Parts of the longest time under water that are told apart; a leg's is rounded up, so the rule always holds."""
 MOST_YOS = 100
+LEAST_HOURS = 0.001
+"""No vehicle comes up twice in four seconds; how often a leg exceeds far less time is too large a number."""
 
 
 @dataclass(frozen=True)
 class Surfacing:
-    """At most so many yos (a dive and a climb), and so many hours, from one surfacing to the next."""
+    """At most so many yos (a dive and a climb), and so many hours, from one surfacing to the next.
+
+    Examples:
+        >>> rule = glider_stream.Surfacing(most_yos=1)
+        >>> path = road.query(surfacing=rule)
+        >>> rule.holds(path)
+        True
+    """
 
     most_yos: int | None = None
     most_hours: float | None = None
@@ -25,7 +35,9 @@ class Surfacing:
         yos, hours = self.most_yos, self.most_hours
         fits = yos is None or 1 <= yos <= MOST_YOS
         require(fits, f"`most_yos` must be from 1 to {MOST_YOS}; got {yos}")
-        require(hours is None or 0 < hours < math.inf, f"`most_hours` must be above 0 h; got {hours}")
+        least, most = LEAST_HOURS, LONGEST / 3600
+        fits = hours is None or least <= hours <= most
+        require(fits, f"`most_hours` must be from {least:g} to {most:,.0f} h; got {hours}")
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -57,4 +69,6 @@ class Surfacing:
         turns = none if self.most_yos is None else ((glide_angle > 0) != (half % 2 == 1)).astype(np.int64)
         if self.most_hours is None:
             return turns, none
-        return turns, np.ceil(np.nan_to_num(time) / (3600 * self.most_hours / BINS) - 1e-9).astype(np.int64)
+        parts = np.ceil(np.nan_to_num(time) / (3600 * self.most_hours / BINS) - 1e-9)
+        # a leg longer than all of it breaks the rule, however much longer it is
+        return turns, np.minimum(parts, BINS + 1).astype(np.int64)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import Array
 from ..base.clock import moment
 from ..base.settings import require
+from ..kernels.edges import TIME
 from ..roadmap.problem import Problem
 from ..roadmap.step_error import step_error
 from .assembly import RoutePlanner, nodes_at, placed_end
@@ -26,8 +27,8 @@ from .surfacing import Surfacing
 from .trade_off import TradeOff, none_within
 from .why_not import why_not
 
-MOST_BINS = 240
-"""How many bins of time after departure a search with bins looks at."""
+MOST_BINS, FEWER_BINS = 240, 48
+"""How many bins of time after departure a search with bins looks at; and one that was not asked to use them."""
 
 
 class ClockPlanner(RoutePlanner):
@@ -76,10 +77,21 @@ class ClockPlanner(RoutePlanner):
         ends = self._ends(start, [goal])
         if np.array_equal(ends.start, ends.goals[0]):
             return self.assembly.path(ends.start, ends.goals[0], [])
-        path = self._first(ends, self._with_bins(aim))
-        if not path.found and self.problem.bins is not None:
-            path = self._first(ends, aim)
-        return path
+        path, search = self._first(ends, self._with_bins(aim))
+        if path.found:
+            return path
+        if self.problem.bins is not None:
+            return self._first(ends, aim)[0]
+        # a glider that cannot hold its place comes back to a node later, and only then finds a way on
+        durations = [float(label.row[TIME]) for label in search.labels if label.row is not None]
+        if not durations or not self.assembly.changes or self.assembly.frozen:
+            return path
+        bins = float(np.median(durations))
+        latest = self.problem.departure + FEWER_BINS * bins
+        again, _ = self._first(ends, replace(aim, bins=bins, latest=latest))
+        until = moment(self.problem.departs, FEWER_BINS * bins)
+        looked = f"ways that come back to a node later were followed until {until}, in bins of {bins:,.0f} s"
+        return again if again.found else replace(path, why=f"{path.why}; {looked}")
 
     def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
         """The cheapest paths from a point (3,) [m] to each of many, by one search."""
@@ -125,6 +137,10 @@ class ClockPlanner(RoutePlanner):
 
     def _ends(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> Ends:
         """Where the ends of a query are, checked."""
+        departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
+        times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
+        within = extent.t_lo <= departure <= extent.t_hi
+        require(within, f"the departure at {departure:g} s lies outside {times}; choose one of them")
         begin = placed_end(self.problem, start, self.problem.start, "start")
         places = [placed_end(self.problem, goal, self.problem.goal, "goal") for goal in goals]
         for place, name in [(begin, "start"), *((place, "goal") for place in places)]:
@@ -136,10 +152,7 @@ class ClockPlanner(RoutePlanner):
         return aim if bins is None else replace(aim, bins=bins, latest=self.problem.departure + MOST_BINS * bins)
 
     def _search(self, ends: Ends, aim: Aim, to_all: bool = False) -> tuple[LabelSearch, ClockExpansion]:
-        departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
-        times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
-        within = extent.t_lo <= departure <= extent.t_hi
-        require(within, f"the departure at {departure:g} s lies outside {times}; choose one of them")
+        departure = self.problem.departure
         expansion = ClockExpansion(self.problem, self.position, ends, self.assembly.frozen)
         goals = np.empty(0, np.int64) if to_all else expansion.goals[0]
         least = LeastTimes(self._speeds_now(), expansion.places)
@@ -154,11 +167,11 @@ class ClockPlanner(RoutePlanner):
             self._speeds[since] = GreatestSpeeds(self.problem, self.position, since)
         return self._speeds[since]
 
-    def _first(self, ends: Ends, aim: Aim) -> Path:
+    def _first(self, ends: Ends, aim: Aim) -> tuple[Path, LabelSearch]:
         """The path of the first label that settles at the goal."""
         search, expansion = self._search(ends, aim)
         settled = (number for number in search.settled() if search.is_goal[search.labels[number].place])
-        return self._path(search, expansion, next(settled, None), ends, 0)
+        return self._path(search, expansion, next(settled, None), ends, 0), search
 
     def _path(
         self,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.terminal import plain
 from .frame import MAX_SCALE_ERROR, LocalFrame
 from .ocean import LonLatGrid, Names, OceanFile, divergence_ratio, index_map, read_currents, sample
 from .ocean.component import TooLargeError
@@ -108,8 +109,8 @@ class Description:
     def __str__(self) -> str:
         file, (dlon, dlat, east, north) = self.file, self.spacing
         nt, nz, ny, nx = file.u.shape
-        lines = [file.name]
-        lines += [f"  {key:<12}{what}" for key, what in file.took.items()]
+        lines = [plain(file.name)]
+        lines += [f"  {plain(key):<12}{plain(what)}" for key, what in file.took.items()]
         (west, east_end), (south, north_end) = file.grid.bounds
         lines.append(f"  extent      lon {west:.5g} to {east_end:.5g}, ")
         lines[-1] += f"lat {south:.5g} to {north_end:.5g}; {100 * self.land:.0f} % land"
@@ -127,7 +128,7 @@ class Description:
             lines.append(f"  at {f'{level.depth:.4g} m':<9}{speeds}{_ratio(level.divergence_ratio)}")
         lines.append(f"  divergence  {self._meaning()}")
         lines.append(f"  frame       {self._frame()}")
-        lines += [f"  note        {note}" for note in file.notes]
+        lines += [f"  note        {plain(note)}" for note in file.notes]
         for point in self.points:
             where = f"{point.lon:g}, {point.lat:g}"
             where += "" if point.depth is None else f", {point.depth:g} m"

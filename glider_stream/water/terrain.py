@@ -28,6 +28,10 @@ MARGIN = 10.0
 """The raster keeps this far [m] from what it stands for: half a look of a leg, and what a map of a grid errs."""
 MOST_TEXT = 50_000_000
 """The most that a file of polygons may hold [bytes]."""
+MOST_VERTICES = 200_000
+"""Of one polygon, and pieces of its rim."""
+MOST_CROSSED = 300
+"""Vertices of a polygon that crosses itself: mended within a second; 3,000 took minutes and 3.7 GB."""
 SEEN, POLE = 60.0, 0.1
 """Polygons are looked at within so many degrees of longitude, and but so far from the poles."""
 DENSE = 0.02
@@ -195,7 +199,8 @@ def _polygons(file: str | Path) -> list[Any]:
         bounds = np.array(one.bounds if not one.is_empty else [np.nan] * 4)
         on_earth = bool((np.abs(bounds) <= [540, 90, 540, 90]).all())  # False for NaN, too
         require(on_earth, f"{path.name} holds a polygon that is empty or not in degrees; mend it")
-    return [_the_short_way(path.name, part) for one in found for part in getattr(one, "geoms", [one])]
+    whole = (part for one in found for part in getattr(one, "geoms", [one]))
+    return [_simple(path.name, _the_short_way(path.name, part)) for part in whole]
 
 
 def _the_short_way(name: str, polygon: Any) -> Any:
@@ -229,11 +234,28 @@ def _in_frame(polygon: Any, frame: LocalFrame) -> list[Any]:
     near = shapely.box(frame.lon - SEEN, -90 + POLE, frame.lon + SEEN, 90 - POLE)
     result = []
     for turn in (-720, -360, 0, 360, 720):
-        part = shapely.segmentize(shapely.affinity.translate(flat, turn, 0).intersection(near), DENSE)
+        part = shapely.affinity.translate(flat, turn, 0).intersection(near)
+        fits = part.length / DENSE <= MOST_VERTICES
+        require(fits, f"a keep-out polygon has a rim of {part.length:,.0f} degrees; simplify it")
+        part = shapely.segmentize(part, DENSE)
         if not part.is_empty:
             local = shapely.transform(part, lambda at: np.stack(frame.to_local(at[:, 0], at[:, 1]), axis=-1))
             result.append(shapely.make_valid(local))
     return result
+
+
+def _simple(name: str, polygon: Any) -> Any:
+    """A polygon that can be made valid; InputError where that would take for ever."""
+    import shapely
+
+    count = int(shapely.get_num_coordinates(polygon))
+    fits = count <= MOST_VERTICES
+    require(fits, f"{name} holds a polygon of {count:,} vertices; simplify it to {MOST_VERTICES:,}")
+    if count <= MOST_CROSSED or shapely.is_valid(polygon):
+        return polygon
+    # each crossing of two edges becomes a vertex, so their number grows with the square
+    few = f"with {count:,} vertices, too many to be mended here; give one of at most {MOST_CROSSED}, or mend it"
+    raise InputError(f"{name} holds a polygon that crosses itself, {few}")
 
 
 def _words_on(file: str, polygons: Sequence[Any], frame: LocalFrame, domain: tuple[Array, Array]) -> str:

@@ -9,8 +9,9 @@ from helpers.slices import DEPARTURES, FEW_NODES, keys, problem, sliced
 
 from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
+from glider_stream.kernels.edges import CONNECTED, STATUS, TIME
 from glider_stream.kernels.follow import COARSE_TOLERANCE, LANDING_TOLERANCE
-from glider_stream.roadmap.builder import build_roadmap, find_edges
+from glider_stream.roadmap.builder import build_roadmap, find_edges, node_positions
 from glider_stream.roadmap.compare import difference
 from glider_stream.roadmap.follow import Follower, nodes_near
 from glider_stream.roadmap.roadmap import EDGE_FIELDS, in_order
@@ -29,18 +30,36 @@ def fresh(number):
 def test_the_first_slice_is_the_roadmap_of_its_departure():
     found = difference(sliced().at(0), fresh(0))
     assert found.same_edges
-    assert found.edges[2] > 1000
+    assert found.edges[2] > 500
 
 
-@pytest.mark.parametrize("number", [1, 3])
-def test_followed_legs_are_those_that_fans_find(number):
-    followed, fan = sliced().at(number), fresh(number)
-    both, mine, others = np.intersect1d(keys(followed), keys(fan), return_indices=True)
-    assert both.size >= 0.97 * keys(fan).size
-    assert keys(followed).size - both.size <= 0.002 * both.size
-    later = followed.time[mine] - fan.time[others]
-    assert np.mean(np.abs(later) < 0.1) > 0.95
-    assert np.quantile(later, 0.99) < 5.0
+def shares(follower, source):
+    """Of each slice after the first: what share of fans' edges it has, what share fans have not, how much later."""
+    for number, found in enumerate(follower.slices(source)):
+        departure = follower.problem.departures[number]
+        fan = replace(follower.problem, departure=departure, slices=()).legs(follower.position).of(source)
+        mine, theirs = rows_and_targets(found), rows_and_targets(fan)
+        later = [mine[pair] - theirs[pair] for pair in mine.keys() & theirs.keys()]
+        yield len(later) / len(theirs), 1 - len(later) / len(mine), np.array(later)
+
+
+def test_followed_legs_are_those_that_fans_find():
+    """Among nodes that lie near enough to each other; a chain of slices loses few."""
+    question = read_scenario("swinging-gyre").problem()
+    question = replace(question, slices=tuple(1800.0 * n for n in range(4)))
+    position = node_positions(question)
+    first, *others = shares(Follower.of(question, position), np.arange(5, len(position), 200))
+    assert first[:2] == (1.0, 0.0)
+    for share, alone, later in others:
+        assert share > 0.98
+        assert alone < 0.005
+        assert np.median(np.abs(later)) < 0.05
+        assert np.quantile(later, 0.97) < 1.0
+
+
+def test_a_node_of_few_legs_gets_a_fan():
+    for number in (1, 3):
+        assert difference(sliced().at(number), fresh(number)).same_edges
 
 
 def test_every_slice_meets_its_targets():
@@ -75,14 +94,14 @@ def test_times_between_slices_are_near_the_truth():
     both, a, b = np.intersect1d(keys(early), keys(late), return_indices=True)
     _, mine, there = np.intersect1d(both, keys(truth), return_indices=True)
     between = 0.5 * (early.time[a] + late.time[b])[mine]
-    assert np.median(np.abs(between - truth.time[there])) < 1.0
+    assert np.median(np.abs(between / truth.time[there] - 1)) < 0.01
 
 
 def test_a_law_of_neighbours_keeps_its_pairs():
     question = problem("neighbours.kind=nearest", "neighbours.k=9")
     position = sliced().position
     source = np.arange(5)
-    one, *others = Follower(question, position, nodes_near(position)).slices(source)
+    one, *others = Follower(question, position, nodes_near(position), few=0).slices(source)
     for found in others:
         assert found.target.tolist() == one.target.tolist()
         assert np.isfinite(found.outcomes[found.outcomes[:, 0] == 0]).all()
@@ -90,26 +109,32 @@ def test_a_law_of_neighbours_keeps_its_pairs():
 
 
 def test_a_limit_keeps_the_fastest():
-    question = problem("neighbours.limit=6")
-    position = sliced().position
-    source = np.arange(0, len(position), 9)
-    follower = Follower(question, position, nodes_near(position))
-    for number, found in enumerate(follower.slices(source)):
-        one = replace(question, departure=question.departures[number], slices=())
-        fan = one.legs(position).of(source)
-        assert np.diff(found.indptr).max() <= 12
-        mine, theirs = (set(zip(*rows_and_targets(each), strict=True)) for each in (found, fan))
-        assert len(mine & theirs) >= 0.93 * len(theirs)
+    question = replace(
+        read_scenario("swinging-gyre", ["neighbours.limit=30"]).problem(), slices=(0.0, 900.0, 1800.0)
+    )
+    position = node_positions(question)
+    source = np.arange(5, len(position), 100)
+    for found in Follower.of(question, position).slices(source):
+        climbs = np.sign(position[found.target, 2] - position[np.repeat(source, np.diff(found.indptr)), 2])
+        for row in range(len(source)):
+            here = climbs[found.indptr[row] : found.indptr[row + 1]]
+            assert max((here > 0).sum(), (here < 0).sum()) <= 30
+    for share, _, _ in shares(Follower.of(question, position), source):
+        assert share > 0.9
 
 
 def rows_and_targets(found):
+    """The time of each edge, by its row and target."""
     rows = np.repeat(np.arange(len(found.indptr) - 1), np.diff(found.indptr))
-    met = found.outcomes[:, 0] == 0
-    return rows[met].tolist(), found.target[met].tolist()
+    met = found.outcomes[:, STATUS] == CONNECTED
+    pairs = zip(rows[met].tolist(), found.target[met].tolist(), strict=True)
+    return dict(zip(pairs, found.outcomes[met, TIME], strict=True))
 
 
 def test_other_methods_begin_each_slice_anew():
-    question = problem("steering.method=streamline", "neighbours.kind=nearest", "neighbours.k=6")
+    question = problem(
+        "steering.method=streamline", "steering.candidates=16", "neighbours.kind=nearest", "neighbours.k=6"
+    )
     source = np.arange(3)
     follower = Follower.of(question, sliced().position)
     for number, found in enumerate(follower.slices(source)):

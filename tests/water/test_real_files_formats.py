@@ -73,7 +73,7 @@ def test_no_time_is_bridged_that_the_file_lacks(tmp_path):
     assert at_hours(file, 50.0) is None
     frame = LocalFrame.over(*DOMAIN)
     flow, _ = ocean_flow(file, frame, *DOMAIN, (0.0, 50.0), "2024-11-20T02:00")
-    assert flow.t_hi == 9 * 3600.0
+    assert flow.extent.t_hi == 9 * 3600.0
     with pytest.raises(InputError, match=r"lies in a gap of currents.nc: no data from 2024-11-20T11:00:00Z"):
         ocean_flow(file, frame, *DOMAIN, (0.0, 50.0), "2024-11-22T00:00")
 
@@ -505,3 +505,44 @@ def test_an_error_of_our_own_is_no_damage_of_the_file(tmp_path):
     (tmp_path / "half.nc").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(InputError, match="truncated or damaged"):
         read_currents(tmp_path / "half.nc")
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"), [("m", 1.0), ("km", 1e3), ("100 km", 1e5), ("100  km", 1e5), ("feet", None)]
+)
+def test_the_unit_of_a_plane(tmp_path, unit, metres):
+    """An Arctic forecast counts its plane in units of 100 km."""
+    pyproj = pytest.importorskip("pyproj")
+    plane = pyproj.Proj("+proj=stere +lat_0=90 +lat_ts=90 +lon_0=-45 +R=6378273")
+    x, y = (at + 1e4 * np.arange(-6.0, 7.0) for at in plane(20.5, 60.5))
+    lon, lat = plane(*np.meshgrid(x, y), inverse=True)
+    turn = -np.radians(plane.get_factors(lon, lat).meridian_convergence)
+    u, v = current(lon, lat)
+    parts = u * np.cos(turn) + v * np.sin(turn), v * np.cos(turn) - u * np.sin(turn)
+    mapping = {
+        "grid_mapping_name": "polar_stereographic",
+        "latitude_of_projection_origin": 90.0,
+        "straight_vertical_longitude_from_pole": -45.0,
+        "standard_parallel": 90.0,
+        "earth_radius": 6378273.0,
+        "false_easting": 0.0,
+        "false_northing": 0.0,
+    }
+    words = {"units": "m s-1", "grid_mapping": "plane"}
+    data = xr.Dataset(
+        {
+            name: (("y", "x"), part, words | {"standard_name": f"sea_water_{axis}_velocity"})
+            for name, part, axis in zip(("vxo", "vyo"), parts, "xy", strict=True)
+        }
+        | {"plane": ((), 0, mapping)},
+        {
+            name: (name, at / (metres or 1.0), {"units": unit, "standard_name": f"projection_{name}_coordinate"})
+            for name, at in (("x", x), ("y", y))
+        },
+    )
+    path = written(tmp_path, data)
+    if metres is None:
+        with pytest.raises(InputError, match=r"`x` in currents.nc is in 'feet', which is no length"):
+            read_currents(path)
+    else:
+        assert sample(read_currents(path), 20.5, 60.5, 0.0) == pytest.approx(current(20.5, 60.5), abs=1e-3)

@@ -212,6 +212,16 @@ def test_some_sigma_levels_are_no_whole_column(tmp_path):
         read_currents(path)
 
 
+def test_a_form_of_levels_that_contradicts_the_file_is_refused(tmp_path):
+    path, _ = sigma_file(tmp_path, slice(None))
+    data = xr.load_dataset(path)
+    data.s_rho.attrs["standard_name"] = "ocean_s_coordinate_g1"
+    with pytest.raises(
+        InputError, match=r"of the form 'ocean_s_coordinate_g1', but the file says `Vtransform` = 2.0"
+    ):
+        read_currents(written(tmp_path, data, "other.nc"))
+
+
 def test_a_file_cut_to_its_lower_fixed_levels_says_nothing_of_the_surface(tmp_path):
     path = written(tmp_path, dataset(depth=[100.0, 150.0, 200.0]))
     assert water(path, 20.5, 60.5, 0.0) is None

@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array, Bools
 from ...base.errors import InputError
+from ...base.settings import require
 from .grid import Grid
 
 Times = NDArray[np.datetime64]
+YEARS = 1000, 8999
+"""What a scenario counts from its epoch stays within the calendar that Python has, years 1 to 9999."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,9 @@ def parse_time(text: str, what: str) -> np.datetime64:
         when = datetime.fromisoformat(text.strip())
     except (ValueError, AttributeError):
         raise InputError(f"{what} must be a time such as 2024-11-20T12:00:00; got {text!r}") from None
+    first, last = YEARS
+    fits = first <= when.year <= last
+    require(fits, f"{what} must lie in the years {first} to {last}; got {text!r}")
     if when.tzinfo is not None:
         when = when.astimezone(UTC).replace(tzinfo=None)
     return np.datetime64(when, "ms")

@@ -21,7 +21,6 @@ class OutsideError(InputError):
     """A domain that lies partly outside a grid."""
 
 
-
 EARTH = 6_371_000.0
 WIDE = 5.0
 """A spacing that is more than so many times the usual one may be a gap, between whose ends there is no data."""

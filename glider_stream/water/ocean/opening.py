@@ -13,7 +13,7 @@ from typing import Any
 
 from ...base.errors import InputError
 from ...base.settings import require
-from ...base.untrusted import check_claim, check_links, groups_of
+from ...base.untrusted import check_claim, check_file, check_links, groups_of
 
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How TIFF files begin."""
@@ -52,6 +52,7 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
     import xarray
 
     require(path.exists(), f"the file {path} does not exist")
+    check_file(path, "the file")
     engine, more = _engine(path)
     try:
         if engine == "h5netcdf":
@@ -180,6 +181,7 @@ def _check_store(path: Path) -> None:
     """A Zarr store names its codecs; one that unpickles runs whatever it holds."""
     for count, file in enumerate(path.rglob("*")):
         require(count < MOST_STORE_FILES, f"{path} holds more than {MOST_STORE_FILES:,} files; cut the store")
+        check_file(file, f"in {path}, ")
         if file.name not in ("zarr.json", ".zarray", ".zmetadata"):
             continue
         try:
@@ -194,4 +196,6 @@ def _check_claims(path: Path, data: Any) -> None:
     """Refuse what no file of its size can hold, before room is made for it."""
     held = sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) if path.is_dir() else path.stat().st_size
     for name, variable in data.variables.items():
+        if path.is_dir() and (path / str(name)).is_dir():
+            held = sum(part.stat().st_size for part in (path / str(name)).rglob("*") if part.is_file())
         check_claim(path.name, f"`{name}`", variable.shape, variable.dtype.itemsize, held)

@@ -72,18 +72,17 @@ class SigmaLevels:
         return np.asarray(zeta + (zeta + h) * S)
 
 
+def _coordinate(data: Any, dim: str, variable: Any) -> Any | None:
+    """The values of s along the levels: by their standard name, under the dimension's name, or CROCO's."""
+    for name in map(str, data.variables):
+        if data[name].dims == (dim,) and SIGMA.match(standard_name(data[name])):
+            return data[name]
+    return data[dim] if dim in data.variables else _among_attributes(data, dim, variable, "sc_r")
+
+
 def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     """What a file says of the terrain-following levels of a variable; InputError names what is missing."""
-    coordinate = next(
-        (
-            data[n]
-            for n in map(str, data.variables)
-            if data[n].dims == (dim,) and SIGMA.match(standard_name(data[n]))
-        ),
-        None,
-    )
-    coordinate = data[dim] if coordinate is None and dim in data.variables else coordinate
-    coordinate = _among_attributes(data, dim, variable, "sc_r") if coordinate is None else coordinate
+    coordinate = _coordinate(data, dim, variable)
     broken = f"`{variable.name}` in {name} is on terrain-following levels `{dim}`"
     if coordinate is None:
         raise InputError(f"{broken} without values of its own; add the file that holds them")
@@ -123,6 +122,10 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
         if transform not in (1.0, 2.0):
             raise InputError(f"{broken}, but the file has no `Vtransform` of 1 or 2; add the grid file that does")
         standard = f"ocean_s_coordinate_g{int(transform)}"
+    require(
+        transform in (None, float(standard[-1])),
+        f"{broken} of the form {standard!r}, but the file says `Vtransform` = {transform}: mend one of them",
+    )
     stretch, critical = term("C", "Cs_r", "Cs_rho"), number("depth_c", "hc", "Tcline")
     stretch = _among_attributes(data, dim, variable, "Cs_r") if stretch is None else stretch
     lacks = [what for what, one in (("Cs_r", stretch), ("hc", critical)) if one is None]
