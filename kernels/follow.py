@@ -220,7 +220,7 @@ def _landed(polar, integration, since, lanes, n):
         lanes[AIM_STATE, n] = LOST
         rest(lanes, n)
         return
-    if coarse_is_enough and left <= FORESEEN:
+    if coarse_is_enough and miss <= NEAR and left <= FORESEEN:
         start, goal = ends_of(lanes, n)
         direction = int(lanes[AIM_DIRECTION, n])
         lanes[AIM_TIME, n] = abs(goal.z - start.z) / vertical_speed(polar, direction, lanes[AIM_ANGLE, n])

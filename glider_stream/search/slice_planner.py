@@ -16,8 +16,9 @@ from .time_dependent import ClockPlanner
 class SlicePlanner(ClockPlanner):
     """Answers queries with the clock running over slices, which a fastest route between two points is found by.
 
-    What slices cannot answer (a rule of surfacing, energy, bins of time, many goals, a departure outside them, or
-    no way that they know) is searched for by legs found when they are needed, as by `ClockPlanner`.
+    What slices cannot answer (a rule of surfacing, energy, bins of time, many goals, legs that leave before the
+    first or after the last of them, no way that they know) is searched for by legs found when they are needed, as
+    by `ClockPlanner`.
     """
 
     def __init__(
@@ -52,6 +53,6 @@ class SlicePlanner(ClockPlanner):
         if np.array_equal(ends.start, ends.goals[0]):
             return self.assembly.path(ends.start, ends.goals[0], [])
         hops, agreement = self.slices.fastest(ends.start, ends.goals[0], problem.departure)
-        if hops is None:
+        if hops is None or problem.departure + sum(edge.time for _, _, edge in hops[:-1]) > last:
             return super()._query(start, goal, aim)
         return replace(self.assembly.path(ends.start, ends.goals[0], hops), notes=(str(agreement),))

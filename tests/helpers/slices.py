@@ -11,7 +11,7 @@ from glider_stream.kernels.edges import CONNECTED, STATUS, TIME
 from glider_stream.roadmap.builder import build_slices
 from glider_stream.scenario import read_scenario
 
-FEW_NODES = ["sampling.shape=[14,8,3]", "flow.period=6000.0"]
+FEW_NODES = ["sampling.shape=[13,7,3]", "flow.period=6000.0"]
 """So many that some have legs enough to be followed, and some get fans."""
 DEPARTURES = [*FEW_NODES, "departures.first=0", "departures.last=1800", "departures.every=600"]
 
