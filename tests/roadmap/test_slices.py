@@ -34,7 +34,7 @@ def test_the_first_slice_is_the_roadmap_of_its_departure():
 
 
 def shares(follower, source):
-    """Of each slice: what share of fans' edges it has, what share fans have not, and how much later [s] each is."""
+    """Of each slice: what share of fans' edges it has, what share fans lack, and how much later [s] each is."""
     for number, found in enumerate(follower.slices(source)):
         departure = follower.problem.departures[number]
         fan = replace(follower.problem, departure=departure, slices=()).legs(follower.position).of(source)
