@@ -23,7 +23,7 @@ import numpy as np
 from completeness_fields import BEYOND, fields
 
 from glider_stream.evaluation import brute_force
-from glider_stream.kernels.edges import Status
+from glider_stream.kernels.edges import MISS, STATUS, TIME, Status
 from glider_stream.kernels.flow import Grid
 from glider_stream.roadmap.evaluator import Evaluator
 from glider_stream.roadmap.neighbours import AllNodes, Nearest, as_csr
@@ -35,7 +35,6 @@ LATE = 1.0
 BOUNDS = {"near": 0.99, "all": 0.98, "in_time_near": 0.99, "in_time_all": 0.99, "reachable": 0.995}
 MOST_OFF = {True: 0.5, False: 0.1}
 """Distance [m] from the target that a replayed leg may end at, on a grid and elsewhere."""
-CONNECTED, TIME, MISS = 0, 1, 6
 Case = tuple[Any, float, Evaluator]
 
 
@@ -69,7 +68,7 @@ def connect(case: Case, source: Any, targets: Any) -> tuple[Any, Any, Any]:
 def compare(case: Case, source: Any, target: Any, rows: Any, best: Any) -> tuple[dict[str, Any], list[Any]]:
     """Brute force's least times beside the flow map's outcomes; the pairs that it misses, or is late for."""
     position = case[0]
-    grid, found = isinstance(case[2].flow, Grid), rows[:, CONNECTED] == Status.CONNECTED
+    grid, found = isinstance(case[2].flow, Grid), rows[:, STATUS] == Status.CONNECTED
     only = np.flatnonzero(found & np.isinf(best))
     off = end_distances(case, source[only], target[only], rows[only])
     false = only[off >= MOST_OFF[grid]]
@@ -98,9 +97,9 @@ def reachable_share(case: Case, source: Any) -> tuple[float, int]:
     position, departure, judge = case
     law = AllNodes().among(position, 1.0)
     start, target, rows = connect(case, source, [law.of(position[n]) for n in source])
-    found = rows[:, CONNECTED] == Status.CONNECTED
+    found = rows[:, STATUS] == Status.CONNECTED
     indptr, under, legs = judge.reach(position, departure, source, 0)
-    hit = legs[:, CONNECTED] == Status.CONNECTED
+    hit = legs[:, STATUS] == Status.CONNECTED
     reached = np.zeros((len(position), len(position)), bool)
     reached[np.repeat(source, np.diff(indptr))[hit], under[hit]] = True
     return float(reached[start[found], target[found]].mean()), int(found.sum())
@@ -126,7 +125,7 @@ def measure(name: str, case: Case, size: dict[str, int], threads: int) -> dict[s
     for law, (outcome, least) in pairs.items():
         counts, result["missed_or_late"][law] = compare(case, *outcome, least)
         result |= {f"{key}_{law}" if key != "share" else law: value for key, value in counts.items()}
-    legs = np.flatnonzero(rows[:, CONNECTED] == Status.CONNECTED)
+    legs = np.flatnonzero(rows[:, STATUS] == Status.CONNECTED)
     legs = rng.choice(legs, min(size["replays"], legs.size), replace=False)
     off = end_distances(case, start[legs], target[legs], rows[legs])
     result |= {"replayed": legs.size, "most_off_m": off.max(), "off_999_m": float(np.quantile(off, 0.999))}
@@ -142,17 +141,18 @@ def odd_pairs(case: Case, count: int) -> int:
     """How many of so many random pairs, degenerate ones among them, have a wrong status, or NaN or not amiss."""
     _, departure, judge = case
     flow, rng = judge.flow, np.random.default_rng(3)
-    lo, hi = np.array([flow.x_lo, flow.y_lo, -300.0]), np.array([flow.x_hi, flow.y_hi, 0.0])
+    known = flow.extent
+    lo, hi = np.array([known.x_lo, known.y_lo, -300.0]), np.array([known.x_hi, known.y_hi, 0.0])
     position = rng.uniform(lo - 0.05 * (hi - lo) * [1, 1, 0], hi + 0.05 * (hi - lo) * [1, 1, 0], (600, 3))
     position[::5, 2] = -100.0
     position[1::7] = position[::7][: len(position[1::7])]  # twins
     position[2::9, :2] = 0.5 * (lo + hi)[:2]  # above each other
-    position[3::11, 0], position[4::13, 1] = flow.x_hi, flow.y_lo  # on the border
+    position[3::11, 0], position[4::13, 1] = known.x_hi, known.y_lo  # on the border
     position[5::17, 2] = np.nextafter(-100.0, 0.0)  # a rise too short for its square
     source, target = np.sort(rng.integers(0, 600, count)), rng.integers(0, 600, count)
     nodes, counts = np.unique(source, return_counts=True)
     rows = judge.connect(position, departure, nodes, np.concatenate([[0], np.cumsum(counts)]), target)
-    status, connected = rows[:, CONNECTED], rows[:, CONNECTED] == Status.CONNECTED
+    status, connected = rows[:, STATUS], rows[:, STATUS] == Status.CONNECTED
     known = ((position >= lo) & (position <= hi))[:, :2].all(axis=1)
     outside = ~(known[source] & known[target])
     level = ~outside & (position[source, 2] == position[target, 2])

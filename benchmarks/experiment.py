@@ -57,7 +57,7 @@ def random_vortices(seed: int) -> list[dict[str, float]]:
     rows = [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
     flow = Vortices(tuple(Vortex(**row) for row in rows)).kernel((-300.0, 0.0))
     box = (-600.0, 600.0)
-    scale = FASTEST / sample_flow(flow, (12.0, 12.0, 10.0), box, box, (-300.0, 0.0)).max_speed
+    scale = FASTEST / sample_flow(flow, (12.0, 12.0, 10.0), box, box, (-300.0, 0.0)).extent.max_speed
     return [row | {"speed": scale * row["speed"]} for row in rows]
 
 

@@ -60,6 +60,7 @@ from glider_stream.base.errors import InputError
 from glider_stream.base.settings import require
 from glider_stream.kernels.flow import velocities
 from glider_stream.kernels.motion import rk4_step
+from glider_stream.kernels.place import Place, Velocity
 from glider_stream.roadmap.problem import Problem
 from glider_stream.scenario import read_scenario
 from glider_stream.water.inspect import is_steady
@@ -89,8 +90,8 @@ class Waters:
         require(bool(np.allclose(*polar.speed)), "the glider dives and climbs by different polars")
         self.flow, self.departure, self.steady = flow, problem.departure, is_steady(flow)
         self.ends = np.array(problem.start, float), np.array(problem.goal, float)
-        self.lo = np.array([flow.x_lo, flow.y_lo, problem.lo[2]])
-        self.hi = np.array([flow.x_hi, flow.y_hi, problem.hi[2]])
+        self.lo = np.array([flow.extent.x_lo, flow.extent.y_lo, problem.lo[2]])
+        self.hi = np.array([flow.extent.x_hi, flow.extent.y_hi, problem.hi[2]])
         borders = bool(np.isfinite([self.lo, self.hi]).all())
         require(borders, "the flow has no borders; give `flow.x` and `flow.y`")
         knots = np.linspace(polar.shallowest[0], polar.steepest[0], polar.speed.shape[1])
@@ -238,8 +239,9 @@ def fly(flow, sinks, levels, heading, sink, duration, start, t):
     path = np.empty((heading.size, 3))
     for n in range(heading.size):
         level, w = np.interp(abs(sink[n]), sinks, levels), sink[n]
+        through = Velocity(level * math.cos(heading[n]), level * math.sin(heading[n]), w)
         for _ in range(steps):
-            x, y = rk4_step(flow, x, y, z, t, level * math.cos(heading[n]), level * math.sin(heading[n]), w, dt)
+            x, y = rk4_step(flow, Place(x, y, z, t), through, dt)
             z += dt * w
         path[n] = x, y, z
     return path

@@ -13,8 +13,10 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from glider_stream.kernels.control import CLIMB, DIVE, candidate_controls, control_towards
+from glider_stream.kernels.control import candidate_controls, control_towards, direction_of
+from glider_stream.kernels.edges import STATUS, TIME, Status
 from glider_stream.kernels.motion import along_segment, rk4_step
+from glider_stream.kernels.place import Pair, Place
 from glider_stream.roadmap.builder import node_positions
 from glider_stream.roadmap.neighbours import AllNodes, Nearest, as_csr
 from glider_stream.roadmap.steering import FlowMapMethod
@@ -22,16 +24,18 @@ from glider_stream.scenario import read_scenario
 
 
 @njit
-def literal_approach(flow, x, y, z, u, v, w, x_q, y_q, z_q, integration):
+def literal_approach(flow, pair, through, integration):
     """Miss [m] and time [s] of the closest approach over all steps."""
     miss, time_of_miss = np.inf, np.inf
     dt = integration.dt
+    start, here = pair.start, pair.start
     for n in range(integration.steps):
-        x_next, y_next = rk4_step(flow, x, y, z + n * dt * w, n * dt, u, v, w, dt)
-        share, distance = along_segment(x, y, z + n * dt * w, x_next, y_next, z + (n + 1) * dt * w, x_q, y_q, z_q)
+        x, y = rk4_step(flow, here, through, dt)
+        there = Place(x, y, start.z + (n + 1) * dt * through.w, start.t + (n + 1) * dt)
+        share, distance = along_segment(here, there, pair.goal)
         if distance < miss:
             miss, time_of_miss = distance, (n + share) * dt
-        x, y = x_next, y_next
+        here = there
     return miss, time_of_miss
 
 
@@ -44,15 +48,13 @@ def literal_loop(flow, polar, steering, integration, position, source, indptr, t
         x, y, z = position[source[n]]
         for k in range(indptr[n], indptr[n + 1]):
             x_q, y_q, z_q = position[target[k]]
-            direction = CLIMB if z_q > z else DIVE
+            pair = Pair(Place(x, y, z, 0.0), Place(x_q, y_q, z_q, 0.0))
             slowest = abs(z_q - z) / (integration.steps * integration.dt)
-            count = candidate_controls(
-                steering, flow, polar, direction, x, y, z, x_q, y_q, z_q, 0.0, slowest, controls
-            )
+            count = candidate_controls(steering, flow, polar, pair, slowest, controls)
             for one in range(count):
-                c = control_towards(polar, direction, controls[one, 0], controls[one, 1])
-                miss, when = literal_approach(flow, x, y, z, c.u, c.v, c.w, x_q, y_q, z_q, integration)
-                if miss < integration.tolerance and when < best[k]:
+                c = control_towards(polar, direction_of(pair), controls[one, 0], controls[one, 1])
+                miss, when = literal_approach(flow, pair, c, integration)
+                if miss < integration.tolerance and 0.0 < when < best[k]:
                     best[k] = when
     return best
 
@@ -89,8 +91,8 @@ def main() -> None:
         began = time.perf_counter()
         exact.connect(position, 0.0, source, indptr, target)
         fan.append(time.perf_counter() - began)
-    same = np.array_equal(np.isfinite(best), edges[:, 0] == 0)
-    same &= bool(np.nanmax(np.abs(best - edges[:, 1])[edges[:, 0] == 0], initial=0.0) < 1e-9)
+    same = np.array_equal(np.isfinite(best), joined := edges[:, STATUS] == Status.CONNECTED)
+    same &= bool(np.nanmax(np.abs(best - edges[:, TIME])[joined], initial=0.0) < 1e-9)
     print(f"seed-box, {options.law}, {evaluator.steering.candidates} controls, {target.size:,} pairs,")
     print(f"{platform.processor() or platform.machine()}, {numba.get_num_threads()} threads")
     print(f"literal loop {target.size / statistics.median(slow):>10,.0f} pairs/s")

@@ -91,13 +91,17 @@ def build(
         "scheduler": scheduler,
         "base": base,
     }
+    empty = ""
     with reporter("build") as progress:
         if shard is not None:
             planner.build_part(scenario, output, shard, progress=progress, **run)
             done = f"part {shard} of a roadmap"
         else:
-            done = str(planner.build(scenario, output, progress=progress, **run))
+            road = planner.build(scenario, output, progress=progress, **run)
+            done, empty = str(road), planner.why_no_edges(road)
     click.echo(f"{done}\n  file:   {output}")
+    if empty:
+        click.echo(f"note: {empty}", err=True)
 
 
 @cli.command()
@@ -107,7 +111,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     """Make one roadmap of PARTS, which `build --shard` wrote."""
     from . import planner
 
-    click.echo(f"{planner.merge(parts, output)}\n  file:   {output}")
+    road = planner.merge(parts, output)
+    click.echo(f"{road}\n  file:   {output}")
+    if empty := planner.why_no_edges(road):
+        click.echo(f"note: {empty}", err=True)
 
 
 @cli.command()
@@ -125,6 +132,10 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
 @click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
+@click.option("--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given.")
+@click.option(
+    "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
+)
 @click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
 @JSON
 def query(
@@ -138,6 +149,8 @@ def query(
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
+    waypoints: int | None,
+    arrival_radius: float | None,
     front: bool,
     as_json: bool,
 ) -> None:
@@ -149,12 +162,14 @@ def query(
     free = most_yos is None and most_hours is None
     rule = None if free else Surfacing(most_yos, most_hours)
     said: Any
+    given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
+    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if front:
-        alone = not outputs and most_energy is None and thin is None and window_hours is None and not as_card
+        alone = not outputs and most_energy is None and thin is None and not asked and not as_card
         if not alone:
             raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --thin, --card and --window-hours; "
-                "leave one of them out"
+                "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
+                "--waypoints and --arrival-radius; leave one of them out"
             )
         corners = open(roadmap).trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
@@ -162,10 +177,11 @@ def query(
         for output in outputs:
             check_export(output)
         road = open(roadmap)
-        asked: dict[str, Any] = {} if window_hours is None else {"window_hours": window_hours}
         path = road.query(
             start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
         )
+        for note in path.notes:
+            click.echo(f"note: {note}", err=True)
         said, found = road.card(path) if as_card and path.found else path, path.found
     if as_json:
         _write_json(said.as_dict())
@@ -259,18 +275,39 @@ def describe(
 
 @cli.command()
 @ROADMAP
-@click.argument("route", type=FILE)
+@click.argument("route", nargs=-1, required=True, type=FILE)
+@click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
 @JSON
-def score(roadmap: Path, route: Path, as_json: bool) -> None:
-    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails."""
+def score(roadmap: Path, route: tuple[Path, ...], start: Any, as_json: bool) -> None:
+    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails.
+
+    CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
+    """
     from . import planner
 
-    found = planner.score(roadmap, route)
+    found = planner.score(roadmap, route, start)
     if as_json:
         _write_json(found.as_dict())
     else:
         click.echo(found, err=not found.flyable)
     if not found.flyable:
+        sys.exit(1)
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--waypoints", type=int, default=8, show_default=True, help="Waypoints a goto list may hold.")
+@JSON
+def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
+    """Look for faults in FILES that vehicles fly: goto lists, yo files, targets; exit code 1 if there are any."""
+    from . import planner
+
+    looked = planner.lint(files, waypoints)
+    if as_json:
+        _write_json([one.as_dict() for one in looked])
+    else:
+        click.echo("\n".join(map(str, looked)))
+    if any(one.faults for one in looked):
         sys.exit(1)
 
 

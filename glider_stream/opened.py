@@ -1,6 +1,7 @@
 """An opened roadmap: roadmap, problem and searches, each made once, when it is first needed."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path as File
 from threading import RLock
 from typing import TYPE_CHECKING, TypeVar
@@ -11,10 +12,11 @@ from .base.arrays import Array
 from .base.settings import require
 from .pilot.card import Card
 from .pilot.card import card as card_of
-from .pilot.export import check_export, export_path
+from .pilot.export import check_export, check_legs, export_path
 from .pilot.route_files import read_drawn
 from .pilot.score import Score
 from .pilot.score import score as score_of
+from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
@@ -25,6 +27,7 @@ from .search.path import Path, load_path
 from .search.query import Planner
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
+from .search.why_not import no_edges
 from .water.domain import GeographicDomain, Point
 
 if TYPE_CHECKING:
@@ -91,20 +94,30 @@ class OpenedRoadmap:
         thin: float | None = None,
         surfacing: Surfacing | None = None,
         window_hours: float = HOURS,
+        most_waypoints: int = MOST_WAYPOINTS,
+        arrival_radius: float | None = None,
     ) -> Path:
         """The cheapest path between two points, written to each of `outputs`.
 
         `most_energy` [J] asks for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins
         legs whose stops lie so near the straight line, where one glide does, and none where that breaks
         another rule. `surfacing` is a rule for how often to come up; the scenario's own if None. Exported
-        windows last `window_hours`.
+        windows last `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within
+        `arrival_radius` [m], each vehicle's usual one if None; `notes` of the path say what else became of files.
         """
         for output in outputs:
             check_export(output)
         path = best_path(self.planner(surfacing), self._ends(start, goal), most_energy=most_energy, thinned=thin)
+        check_legs(path, outputs)
+        notes: list[str] = []
+        written = {
+            "window_hours": window_hours,
+            "most_waypoints": most_waypoints,
+            "arrival_radius": arrival_radius,
+        }
         for output in outputs:
-            export_path(path, output, window_hours)
-        return path
+            export_path(path, output, notes.append, **written)
+        return replace(path, notes=tuple(notes))
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
         """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none."""
@@ -125,18 +138,32 @@ class OpenedRoadmap:
         """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
         return card_of(path, self.problem)
 
-    def score(self, route: str | File) -> Score:
-        """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in the roadmap's water."""
-        drawn = read_drawn(route)
+    def why_no_edges(self) -> str:
+        """Why it holds no edge, in a sentence; empty where it holds some."""
+        return "" if self.roadmap.target.size else no_edges(self.roadmap, self.problem)
+
+    def score(self, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
+        """Fly a drawn route (CSV, GeoJSON, KML, GPX, a path file, goto lists, targets) in the roadmap's water.
+
+        Several files are one route, one after another. `start` is where the vehicle is, before its first point.
+        """
+        files = [route] if isinstance(route, str | File) else list(route)
+        drawn = [read_drawn(file) for file in files]
         # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
         planner, domain = self.planner(Surfacing()), self.scenario.domain
         on_globe = isinstance(domain, GeographicDomain)
         cure = "and the roadmap is in metres; give x, y, z in a CSV file"
-        require(on_globe or not drawn.geographic, f"the route {route} is in longitude and latitude, {cure}")
-        points = [domain.point(place) if drawn.geographic else np.array(place) for place in drawn.places]
-        for n, point in enumerate(points, 1):
-            self.problem.check_point(point, f"point {n}")
-        return score_of(points, planner.connect, planner.query, planner.fly)
+        points = [] if start is None else [self._point(start)]
+        for file, one in zip(files, drawn, strict=True):
+            require(on_globe or not one.geographic, f"the route {file} is in longitude and latitude, {cure}")
+            points += [domain.point(place) if one.geographic else np.array(place) for place in one.places]
+        require(len(points) > 1, f"the route {files[0]} holds one point; say with --start where the vehicle is")
+        for n, point in enumerate(points, 1 if start is None else 0):
+            self.problem.check_point(point, f"point {n}" if n else "start")
+        notes = [note for one in drawn for note in one.notes]
+        if start is None and drawn[0].of_vehicle:
+            notes.append("the way to its first point is not scored; say with --start where the vehicle is")
+        return replace(score_of(points, planner.connect, planner.query, planner.fly), notes=tuple(notes))
 
     def plot(
         self,

@@ -14,7 +14,10 @@ from .opened import OpenedRoadmap
 from .opened import open as open_roadmap
 from .pilot.card import Card
 from .pilot.export import check_export
+from .pilot.lint import Linted
+from .pilot.lint import lint as lint_file
 from .pilot.score import Score
+from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
@@ -157,6 +160,8 @@ def query(
     thin: float | None = None,
     surfacing: Surfacing | None = None,
     window_hours: float = HOURS,
+    most_waypoints: int = MOST_WAYPOINTS,
+    arrival_radius: float | None = None,
 ) -> Path:
     """The cheapest path between two points, as `OpenedRoadmap.query` has it.
 
@@ -172,6 +177,8 @@ def query(
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
+        most_waypoints=most_waypoints,
+        arrival_radius=arrival_radius,
     )
 
 
@@ -190,9 +197,19 @@ def card(roadmap: AnyRoadmap, path: Path) -> Card:
     return open_roadmap(roadmap).card(path)
 
 
-def score(roadmap: AnyRoadmap, route: str | File) -> Score:
-    """Fly a route that somebody drew (CSV, GeoJSON, KML, GPX, or a path file) in a roadmap's water."""
-    return open_roadmap(roadmap).score(route)
+def score(roadmap: AnyRoadmap, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
+    """Fly a drawn route, from one file or several, in a roadmap's water, as `OpenedRoadmap.score` has it."""
+    return open_roadmap(roadmap).score(route, start)
+
+
+def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
+    """What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets."""
+    return [lint_file(file, most_waypoints) for file in files]
+
+
+def why_no_edges(roadmap: AnyRoadmap) -> str:
+    """Why a roadmap holds no edge, in a sentence; empty where it holds some."""
+    return open_roadmap(roadmap).why_no_edges()
 
 
 def verify(roadmap: str | File, sample: int = 200) -> "Verification":

@@ -102,13 +102,14 @@ class Scenario:
         table, frame = polar(self.glider), self.domain.frame()
         horizon = self.integration.dt * self.integration.steps
         flow, terrain, words = self._waters(float(table.best_horizontal.max()) * horizon, horizon)
-        times = f"the times of the flow, {flow.t_lo:g} to {flow.t_hi:g} s"
-        within = flow.t_lo <= self.departure <= flow.t_hi
+        known = flow.extent
+        times = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
+        within = known.t_lo <= self.departure <= known.t_hi
         require(within, f"`query.departure` = {self.departure:g} s lies outside {times}; choose one of them")
-        fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {flow.max_speed:g}; mend [flow]"
-        require(flow.max_speed <= FASTEST, fast)
+        fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {known.max_speed:g}; mend [flow]"
+        require(known.max_speed <= FASTEST, fast)
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
-        words += f", at most {flow.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
+        words += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
             words += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
         sampler = self.sampler
@@ -131,6 +132,7 @@ class Scenario:
             glider_words=str(self.glider),
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
             departs=self._departs(),
+            domain=self.domain,
         )
 
     @property
@@ -156,19 +158,24 @@ class Scenario:
             assert isinstance(self.domain, GeographicDomain)
             domain, frame = self.domain, self.domain.frame()
             ocean, bottom, said = self.flow.waters(frame, domain.lon, domain.lat, domain.depth)
-            rim = np.array([ocean.x_lo, ocean.y_lo]), np.array([ocean.x_hi, ocean.y_hi])
+            known = ocean.extent
+            rim = np.array([known.x_lo, known.y_lo]), np.array([known.x_hi, known.y_hi])
             seabed, also = self._grounds(rim, [bottom])
             return ocean, seabed, f"{said}; {also}"
         lo, hi = self.domain.box()
         flow = self.flow.kernel((lo[2], hi[2]))
         if self.flow.sampled is not None:
             # no path between two nodes strays further from the box than half of what a leg can cover
-            stray = (glide + flow.max_speed * horizon) / 2
+            stray = (glide + flow.extent.max_speed * horizon) / 2
             x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
             exact, flow = flow, sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
         words = next(name for name, one in FLOWS.items() if one is type(self.flow))
         if self.flow.sampled is not None:
-            box = ((max(lo[0], flow.x_lo), min(hi[0], flow.x_hi)), (max(lo[1], flow.y_lo), min(hi[1], flow.y_hi)))
+            known = flow.extent
+            box = (
+                (max(lo[0], known.x_lo), min(hi[0], known.x_hi)),
+                (max(lo[1], known.y_lo), min(hi[1], known.y_hi)),
+            )
             off = sampling_error(exact, flow, *box, (lo[2], hi[2]))
             spacing = ", ".join(f"{step:g}" for step in self.flow.sampled)
             words += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
@@ -176,7 +183,7 @@ class Scenario:
             return flow, OpenWater(-np.inf), words
         if self.terrain == TerrainSettings(max_depth=self.terrain.max_depth):
             return flow, OpenWater(-float(self.terrain.max_depth or np.inf)), words
-        wide = (glide + flow.max_speed * horizon) / 2
+        wide = (glide + flow.extent.max_speed * horizon) / 2
         seabed, also = self._grounds((lo[:2] - wide, hi[:2] + wide), [])
         return flow, seabed, f"{words}; {also}"
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numba
 from numba import njit
+from numba.extending import overload, register_jitable
 
 config: Any = numba.config  # its settings are made at run time
 
@@ -53,6 +54,16 @@ kernel = njit(**BARE)
 """Compiles a kernel that makes none, nor takes one that a callee has made."""
 inlined = njit(**BARE | {"inline": "always"})
 """As `kernel`, and put in the place of its call."""
+shared = register_jitable(**BARE)
+"""As `kernel` where a kernel calls it; Python runs it as it stands."""
+
+
+def in_kernels(function: Callable[..., Any], table: dict[type, Callable[..., Any]]) -> None:
+    """Let kernels call a function that chooses by its first argument's class: compiled, it is the table's row."""
+
+    @overload(function, jit_options=BARE, strict=False)
+    def chosen(first: Any, *others: Any) -> Any:
+        return table.get(getattr(first, "instance_class", type(None)))
 
 
 def entry_point(**options: Any) -> Callable[[Callable[..., Any]], Any]:

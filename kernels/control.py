@@ -7,9 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba.extending import overload
-
-from .cache import BARE, kernel
+from .cache import in_kernels, kernel, shared
 from .flow import Array, mean_velocity
 from .stream import stream_value
 
@@ -67,14 +65,24 @@ def vertical_speed(polar, direction, angle):
 
 
 @kernel
+def heading_of(x, y):
+    """The heading of a direction [rad], from -pi, which is west, up to but not including pi."""
+    heading = math.atan2(y, x)
+    return heading if heading < math.pi else -math.pi
+
+
+@shared
+def control_of(speed: float, glide_angle: float, heading: float) -> Control:
+    """The control of a speed through water [m/s], a signed glide angle and a heading [rad]."""
+    along = speed * math.cos(glide_angle)
+    u, v = along * math.cos(heading), along * math.sin(heading)
+    return Control(u, v, speed * math.sin(glide_angle), glide_angle, heading, speed)
+
+
+@kernel
 def control_towards(polar, direction, angle, heading):
-    """The control at a glide angle's magnitude and a heading [rad]."""
-    speed = glide_speed(polar, direction, angle)
-    signed = angle if direction == CLIMB else -angle
-    along = speed * math.cos(signed)
-    return Control(
-        along * math.cos(heading), along * math.sin(heading), speed * math.sin(signed), signed, heading, speed
-    )
+    """The control at a glide angle's magnitude and a heading [rad], at the polar's speed."""
+    return control_of(glide_speed(polar, direction, angle), angle if direction == CLIMB else -angle, heading)
 
 
 @kernel
@@ -114,6 +122,12 @@ def angle_of_vertical_speed(polar, direction, speed):
     return high
 
 
+@kernel
+def direction_of(pair):
+    """Whether a leg between the pair dives or climbs."""
+    return CLIMB if pair.goal.z > pair.start.z else DIVE
+
+
 class ControlPlane(NamedTuple):
     """A u + B v + C = 0: velocities through water that cancel the flow across the line p -> q.
 
@@ -131,15 +145,16 @@ class ControlPlane(NamedTuple):
 
 
 @kernel
-def control_plane(flow, x_p, y_p, z_p, x_q, y_q, z_q, t):
+def control_plane(flow, pair):
     """The control plane of a pair (design, section 3, step 3): A = dy, B = -dx, C = psi_c."""
-    a = y_q - y_p
-    b = x_p - x_q
+    p, q = pair
+    a = q.y - p.y
+    b = p.x - q.x
     length = math.hypot(a, b)
     if length == 0.0:
-        u, v = mean_velocity(flow, x_p, y_p, z_p, z_q, t)
+        u, v = mean_velocity(flow, p.x, p.y, p.z, q.z, p.t)
         return ControlPlane(0.0, 0.0, 0.0, math.hypot(u, v), -u, -v)
-    c = stream_value(flow, x_p, y_p, z_p, x_q, y_q, z_q, t)
+    c = stream_value(flow, pair)
     return ControlPlane(a, b, c, abs(c) / length, 0.0, 0.0)
 
 
@@ -169,11 +184,12 @@ def heading_on_line(plane, horizontal, branch):
     s = math.sqrt(max(0.0, r * horizontal * horizontal - plane.c * plane.c))
     u = (-plane.a * plane.c + branch * plane.b * s) / r
     v = (-plane.b * plane.c - branch * plane.a * s) / r
-    return math.atan2(v, u)
+    return heading_of(u, v)
 
 
-def _on_line(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls):
-    plane = control_plane(flow, x_p, y_p, z_p, x_q, y_q, z_q, t)
+def _on_line(steering, flow, polar, pair, slowest, controls):
+    direction = direction_of(pair)
+    plane = control_plane(flow, pair)
     if plane.lowest > polar.best_horizontal[direction]:
         return NO_CONTROL
     # the part of the glide range that is fast enough for the plane and for the depth
@@ -185,8 +201,8 @@ def _on_line(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, 
     shallow = max(shallow, needed)
     if plane.a == 0.0 and plane.b == 0.0:
         count = min(2, steering.candidates)
-        controls[0] = (steep, math.atan2(plane.v, plane.u))
-        controls[count - 1] = (shallow if count == 2 else steep, math.atan2(plane.v, plane.u))
+        controls[0] = (steep, heading_of(plane.u, plane.v))
+        controls[count - 1] = (shallow if count == 2 else steep, heading_of(plane.u, plane.v))
         return count
     count = steering.candidates
     angles = (count + 1) // 2
@@ -198,7 +214,8 @@ def _on_line(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, 
     return count
 
 
-def _on_surface(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls):
+def _on_surface(steering, flow, polar, pair, slowest, controls):
+    direction = direction_of(pair)
     # a golden-ratio lattice: even in glide angle, even in heading, and in both together
     steep = polar.steepest[direction]
     span = steep - polar.shallowest[direction]
@@ -213,18 +230,13 @@ def _on_surface(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, 
 _CANDIDATES: dict[type, Callable[..., Any]] = {Streamline: _on_line, Surface: _on_surface}
 
 
-def candidate_controls(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls):
+def candidate_controls(steering, flow, polar, pair, slowest, controls):
     """Fill `controls` (candidates, 2) with (angle's magnitude, heading) [rad], steepest first.
 
     `slowest` [m/s] is the vertical speed that reaches the depth at the horizon. Returns how many there
     are, or NO_CONTROL where the lowest-speed test fails.
     """
-    method = _CANDIDATES[type(steering)]
-    return method(steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls)
+    return _CANDIDATES[type(steering)](steering, flow, polar, pair, slowest, controls)
 
 
-@overload(candidate_controls, jit_options=BARE)
-def _candidate_controls_in_kernels(
-    steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
-):
-    return _CANDIDATES.get(getattr(steering, "instance_class", type(None)))
+in_kernels(candidate_controls, _CANDIDATES)

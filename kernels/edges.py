@@ -5,9 +5,9 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from .cache import inlined, kernel
-from .control import Polar, vertical_speed
+from .control import Polar, direction_of, vertical_speed
 from .cost import Cost
-from .flow import Flow, contains
+from .flow import Array, Flow, contains
 from .motion import Integration
 from .terrain import Terrain
 
@@ -58,6 +58,11 @@ class Edge(NamedTuple):
     miss: float
 
 
+STATUS, TIME, COST, GLIDE_ANGLE, HEADING, SPEED, MISS = range(len(Edge._fields))
+"""Columns of an outcome: a row of the fields of an Edge."""
+EDGE_COLUMNS = len(Edge._fields)
+
+
 @inlined
 def no_edge(status):
     """An edge that is not there, and why."""
@@ -66,28 +71,35 @@ def no_edge(status):
 
 @inlined
 def store(row, edge):
-    """The fields of an edge into `row` (7,)."""
-    row[0] = edge.status
-    row[1] = edge.time
-    row[2] = edge.cost
-    row[3] = edge.glide_angle
-    row[4] = edge.heading
-    row[5] = edge.speed
-    row[6] = edge.miss
+    """The fields of an edge into `row` (EDGE_COLUMNS,)."""
+    row[STATUS] = edge.status
+    row[TIME] = edge.time
+    row[COST] = edge.cost
+    row[GLIDE_ANGLE] = edge.glide_angle
+    row[HEADING] = edge.heading
+    row[SPEED] = edge.speed
+    row[MISS] = edge.miss
+
+
+def edge_of(row: Array) -> Edge:
+    """The Edge of an outcome, for callers from Python."""
+    return Edge(int(row[STATUS]), *(float(value) for value in row[TIME:]))
 
 
 @kernel
-def quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t):
+def quick_status(medium, pair):
     """What can be told of a pair before any control is looked at; CONNECTED where nothing forbids it."""
     flow, polar, integration = medium.flow, medium.polar, medium.integration
-    if not (contains(flow, x_p, y_p, t) and contains(flow, x_q, y_q, t)):
+    p, q = pair
+    if not (contains(flow, p.x, p.y, p.t) and contains(flow, q.x, q.y, p.t)):
         return OUTSIDE_FLOW
-    if z_p == z_q:
+    if p.z == q.z:
         return SAME_DEPTH
+    direction = direction_of(pair)
     horizon = integration.steps * integration.dt
-    if vertical_speed(polar, direction, polar.steepest[direction]) * horizon < abs(z_q - z_p):
+    if vertical_speed(polar, direction, polar.steepest[direction]) * horizon < abs(q.z - p.z):
         return TOO_FAR
-    reach = (polar.best_horizontal[direction] + flow.max_speed) * horizon + integration.tolerance
-    if math.hypot(x_q - x_p, y_q - y_p) > reach:
+    reach = (polar.best_horizontal[direction] + flow.extent.max_speed) * horizon + integration.tolerance
+    if math.hypot(q.x - p.x, q.y - p.y) > reach:
         return TOO_FAR
     return CONNECTED

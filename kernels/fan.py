@@ -9,19 +9,27 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .cache import entry_point, kernel, making
-from .control import angle_of_vertical_speed, glide_speed, vertical_speed
-from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, hangar, place, rest
-from .motion import LANES, W, X, Y, Z
-from .patch import MAX_LEVELS, fill_patch, guess_in_patch, longer, wants_halving
+from .control import angle_of_vertical_speed, control_towards, vertical_speed
+from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_for, hangar, place, rest
+from .flow import Array, Numbers
+from .motion import LANE_W, LANE_X, LANE_Y, LANE_Z, LANES
+from .patch import MAX_LEVELS, Cell, Guesses, Nodes, Slab, fill_patch, guess_in_patch, longer, wants_halving
+from .place import Place
 
-THROUGH = 2
-"""Column of a vertex, after its angle and heading: how many levels it flies through."""
-ROW, COLUMN, SIZE, LEVELS = range(4)
+VERTEX_ANGLE, VERTEX_HEADING, VERTEX_THROUGH = range(3)
+"""Columns of a vertex: its control's magnitude of the angle and heading [rad]; how many levels it flies to."""
+CELL_ROW, CELL_COLUMN, CELL_SIZE, CELL_LEVELS = range(4)
 """Columns of a cell: its first corner and its size on the lattice, its levels as bits."""
-_VERTEX, _LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
+CORNERS = 9
+"""Vertices of a cell that is halved: three by three."""
+FAN_VERTEX, FAN_LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
+"""Rows of a lane beyond `flight`'s: its vertex, and the level that it flies to."""
 FAN_ROWS = FLIGHT_ROWS + 2
+IN_TIME = 1.0 + 1e-9
+"""A level this little beyond the horizon, as a share, is in time."""
 
 
 class FlowMap(NamedTuple):
@@ -35,12 +43,70 @@ class FlowMap(NamedTuple):
     generations: int
 
 
-@kernel
-def layers_outward(bins, z, outward, deepest, levels, layers):
-    """The bins' levels from z outward, as far as `deepest` [m]: heights and layers; returns how many.
+class Launch(NamedTuple):
+    """Where and when the controls of a fan set off, in which direction; their steps `dt` [s]."""
 
-    Layer k holds the nodes between level k - 1, at first z, and level k.
+    origin: Place
+    direction: int
+    dt: float
+
+
+class Sweep(NamedTuple):
+    """A fan that is looked into: its launch, the `task` that it is for, how far it goes.
+
+    Within `horizon` [s], and to no node that lies further than `deepest` [m]. With `backward`, back in time:
+    over the nodes that may reach the origin.
     """
+
+    launch: Launch
+    task: int
+    backward: bool
+    deepest: float
+    horizon: float
+
+
+class Levels(NamedTuple):
+    """Levels from a fan's origin on: heights [m], and the layers of nodes. Layer k ends at level k."""
+
+    height: Array
+    layer: Numbers
+
+
+class Mesh(NamedTuple):
+    """A fan's vertices, on the finest lattice that there may be.
+
+    `rows` (angles,) the glide angles [rad] of the coarsest mesh, `unit` the size of its cells on the lattice;
+    `lattice` says which vertex lies where, -1 where none does; `vertex` (at least all, 3), `landing` (at least
+    all, 2 levels): x, y [m] at each level.
+    """
+
+    rows: Array
+    unit: int
+    lattice: NDArray[np.int32]
+    vertex: Array
+    landing: Array
+
+
+class Look(NamedTuple):
+    """What a look into the cells of a fan needs; `patches` (3, 6, 2) and `corners` (CORNERS,) are scratch."""
+
+    nodes: Nodes
+    sweep: Sweep
+    levels: Levels
+    mesh: Mesh
+    patches: Array
+    corners: Numbers
+
+
+@kernel
+def outward_of(direction, backward):
+    """The way that a fan goes, up or down: against its direction where it flies back in time."""
+    return 1 - direction if backward else direction
+
+
+@kernel
+def layers_outward(bins, z, outward, deepest, heights, layers):
+    """The bins' levels from z outward, as far as `deepest` [m]: heights and layers; returns how many."""
     count = 0
     total = bins.levels.size
     for n in range(total):
@@ -48,12 +114,25 @@ def layers_outward(bins, z, outward, deepest, levels, layers):
         level = bins.levels[m]
         if (level <= z) if outward == 1 else (level >= z):
             continue
-        levels[count] = level
+        heights[count] = level
         layers[count] = m - 1 if outward == 1 and not bins.aligned else m
         count += 1
         if (level >= deepest) if outward == 1 else (level <= deepest):
             break
     return count
+
+
+@making
+def levels_in_reach(polar, bins, sweep):
+    """The levels that a fan may reach within its horizon."""
+    direction, z = sweep.launch.direction, sweep.launch.origin.z
+    heights, layers = np.empty(MAX_LEVELS), np.empty(MAX_LEVELS, np.int64)
+    outward = outward_of(direction, sweep.backward)
+    count = layers_outward(bins, z, outward, sweep.deepest, heights, layers)
+    furthest = vertical_speed(polar, direction, polar.steepest[direction]) * sweep.horizon * IN_TIME
+    while count > 1 and abs(heights[count - 2] - z) > furthest:
+        count -= 1
+    return Levels(heights[:count], layers[:count])
 
 
 @kernel
@@ -76,34 +155,42 @@ def fan_rows(polar, direction, nearest, horizon, rows):
 
 
 @kernel
-def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, last, dt, landing, lanes):
-    """Fly the controls of vertices first..last - 1 from (x, y, z) at t through `levels`, into rows of `landing`.
+def _launch(polar, launch, heights, vertex, one, lanes, n):
+    """Send lane n off with a vertex's control, to the first level."""
+    c = control_towards(polar, launch.direction, vertex[one, VERTEX_ANGLE], vertex[one, VERTEX_HEADING])
+    place(lanes, n, launch.origin, c)
+    lanes[FAN_VERTEX, n], lanes[FAN_LEVEL, n] = one, 0.0
+    fly_for(lanes, n, (heights[0] - launch.origin.z) / c.w, launch.dt)
 
-    `vertex` (n, 3): glide angle, heading, and THROUGH how many levels; `landing` (n, 2 levels): x, y at each.
-    Levels against the control's direction fly it back in time, to where it would have left to land at
-    (x, y, z): in a steady flow the flow map's inverse.
+
+@kernel
+def land_on_levels(medium, launch, heights, vertex, landing, first, last, lanes):
+    """Fly the controls of vertices first..last - 1 through levels, `heights` [m], into rows of `landing`.
+
+    `vertex` and `landing` as in Mesh. Levels against the control's direction fly it back in time, to where it
+    would have left to land at the origin: in a steady flow the flow map's inverse.
     """
     following = first
     flying = 0
     for n in range(LANES):
         rest(lanes, n)
         if following < last:
-            _launch(polar, direction, x, y, z, t, levels, vertex, following, dt, lanes, n)
+            _launch(medium.polar, launch, heights, vertex, following, lanes, n)
             following += 1
             flying += 1
     while flying > 0:
-        advance(flow, lanes)
+        advance(medium.flow, lanes)
         for n in range(LANES):
-            if lanes[LEFT, n] > 0.0:
+            if lanes[LANE_LEFT, n] > 0.0:
                 continue
-            one, level = int(lanes[_VERTEX, n]), int(lanes[_LEVEL, n])
-            landing[one, 2 * level], landing[one, 2 * level + 1] = lanes[X, n], lanes[Y, n]
-            if level + 1 < vertex[one, THROUGH]:
-                lanes[Z, n] = levels[level]
-                lanes[_LEVEL, n] = level + 1
-                fly_for(lanes, n, (levels[level + 1] - levels[level]) / lanes[W, n], dt)
+            one, level = int(lanes[FAN_VERTEX, n]), int(lanes[FAN_LEVEL, n])
+            landing[one, 2 * level], landing[one, 2 * level + 1] = lanes[LANE_X, n], lanes[LANE_Y, n]
+            if level + 1 < vertex[one, VERTEX_THROUGH]:
+                lanes[LANE_Z, n] = heights[level]
+                lanes[FAN_LEVEL, n] = level + 1
+                fly_for(lanes, n, (heights[level + 1] - heights[level]) / lanes[LANE_W, n], launch.dt)
             elif following < last:
-                _launch(polar, direction, x, y, z, t, levels, vertex, following, dt, lanes, n)
+                _launch(medium.polar, launch, heights, vertex, following, lanes, n)
                 following += 1
             else:
                 rest(lanes, n)
@@ -111,147 +198,193 @@ def land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, first, la
 
 
 @entry_point()
-def landings(flow, polar, direction, x, y, z, t, height, angle, heading, dt):
+def landings(medium, launch, height, angle, heading):
     """Where controls of magnitude `angle` (n,) and `heading` (n,) [rad] land at a height [m]: x, y (n, 2) [m]."""
     vertex = np.ones((angle.size, 3))
-    vertex[:, 0], vertex[:, 1] = angle, heading
+    vertex[:, VERTEX_ANGLE], vertex[:, VERTEX_HEADING] = angle, heading
     landing = np.empty((angle.size, 2))
     first = np.int64(0)
-    land_on_levels(
-        flow, polar, direction, x, y, z, t, np.array([height]), vertex, first, angle.size, dt, landing,
-        hangar(FAN_ROWS),
-    )  # fmt: skip
+    land_on_levels(medium, launch, np.array([height]), vertex, landing, first, angle.size, hangar(FAN_ROWS))
     return landing
 
 
-@kernel
-def _launch(polar, direction, x, y, z, t, levels, vertex, one, dt, lanes, n):
-    """Send lane n off with a vertex's control, to the first level."""
-    angle, heading = vertex[one, 0], vertex[one, 1]
-    speed = glide_speed(polar, direction, angle)
-    along = speed * math.cos(angle)
-    w = (2.0 * direction - 1.0) * speed * math.sin(angle)
-    place(lanes, n, x, y, z, t, along * math.cos(heading), along * math.sin(heading), w)
-    lanes[_VERTEX, n], lanes[_LEVEL, n] = one, 0.0
-    fly_for(lanes, n, (levels[0] - z) / w, dt)
-
-
 @making
-def fan_guesses(
-    medium, steering, bins, position, wanted, task, direction, backward, x, y, z, t, deepest, horizon, dt,
-    guesses, count, lanes,
-):  # fmt: skip
-    """First guesses for the wanted nodes that (x, y, z) may reach within `horizon` [s], one vertical direction.
-
-    `wanted` (nodes,), all where it is empty; none lies further than `deepest` [m]. With `backward`, those
-    that may reach it, and the controls that they would take. They follow the `count` guesses that are there;
-    returns (guesses, count).
-    """
-    flow, polar = medium.flow, medium.polar
-    levels = np.empty(MAX_LEVELS)
-    layers = np.empty(MAX_LEVELS, np.int64)
-    outward = 1 - direction if backward else direction
-    reached = layers_outward(bins, z, outward, deepest, levels, layers)
-    fastest = vertical_speed(polar, direction, polar.steepest[direction]) * horizon * (1.0 + 1e-9)
-    while reached > 1 and abs(levels[reached - 2] - z) > fastest:
-        reached -= 1
-    if reached == 0:
-        return guesses, count
-    levels = levels[:reached]
-    rows = np.empty(steering.angles)
-    # between levels, the nodes of the first layer may lie as near as they like
-    if not fan_rows(polar, direction, abs(levels[0] - z) if bins.aligned else 0.0, horizon, rows):
-        return guesses, count
-    row_count = rows.size
-
-    # the finest mesh there may be, as a lattice: which vertex lies where, -1 where none does
+def coarsest_mesh(steering, rows, levels):
+    """A mesh without vertices."""
     unit = 2 << steering.generations
-    lattice = np.full(((row_count - 1) * unit + 1, steering.headings * unit), -1, np.int32)
-    turn = 2.0 * math.pi / lattice.shape[1]
-    cells = np.empty((row_count * steering.headings, 4), np.int64)
-    waiting = 0
-    for i in range(row_count - 1):
+    lattice = np.full(((rows.size - 1) * unit + 1, steering.headings * unit), -1, np.int32)
+    return Mesh(rows, unit, lattice, np.empty((512, 3)), np.empty((512, 2 * levels)))
+
+
+@kernel
+def coarsest_cells(polar, bins, sweep, levels, mesh, cells):
+    """The cells of the coarsest mesh, each with the levels that it takes part in, into `cells`; how many."""
+    direction, z = sweep.launch.direction, sweep.launch.origin.z
+    count = 0
+    for i in range(mesh.rows.size - 1):
         # a cell takes part where its steeper row is in time; the other flies on for a ratio longer
-        furthest = vertical_speed(polar, direction, rows[i + 1]) * horizon * (1.0 + 1e-9)
+        furthest = vertical_speed(polar, direction, mesh.rows[i + 1]) * sweep.horizon * IN_TIME
         through = 0
-        while through < reached and abs(levels[through] - z) <= furthest:
+        while through < levels.height.size and abs(levels.height[through] - z) <= furthest:
             through += 1
         if not bins.aligned:
             # nodes between levels: one more, to interpolate
-            through = min(through + 1, reached)
-        for j in range(steering.headings):
-            cell = cells[waiting]
-            cell[ROW], cell[COLUMN], cell[SIZE], cell[LEVELS] = i * unit, j * unit, unit, (1 << through) - 1
+            through = min(through + 1, levels.height.size)
+        for j in range(0, mesh.lattice.shape[1], mesh.unit):
+            cell = cells[count]
+            cell[CELL_ROW], cell[CELL_COLUMN], cell[CELL_SIZE] = i * mesh.unit, j, mesh.unit
+            cell[CELL_LEVELS] = (1 << through) - 1
+            count += 1
+    return count
+
+
+@kernel
+def corner_of(mesh, cell, corner):
+    """Where a corner of a cell, halved, lies on the lattice; headings go round."""
+    half = cell[CELL_SIZE] // 2
+    return cell[CELL_ROW] + corner // 3 * half, (cell[CELL_COLUMN] + corner % 3 * half) % mesh.lattice.shape[1]
+
+
+@kernel
+def add_vertices(mesh, cell, new, count):
+    """Add the vertices of a halved cell that are not there; those from `new` on have not flown. How many now."""
+    top = 0
+    while (cell[CELL_LEVELS] >> top) > 0:
+        top += 1
+    for corner in range(CORNERS):
+        i, j = corner_of(mesh, cell, corner)
+        one = mesh.lattice[i, j]
+        if one < 0:
+            mesh.lattice[i, j] = count
+            row = min(i // mesh.unit, mesh.rows.size - 2)
+            share = i / mesh.unit - row
+            mesh.vertex[count, VERTEX_ANGLE] = (1.0 - share) * mesh.rows[row] + share * mesh.rows[row + 1]
+            mesh.vertex[count, VERTEX_HEADING] = j * (2.0 * math.pi / mesh.lattice.shape[1])
+            mesh.vertex[count, VERTEX_THROUGH] = top
+            count += 1
+        elif one >= new:
+            mesh.vertex[one, VERTEX_THROUGH] = max(mesh.vertex[one, VERTEX_THROUGH], top)
+    return count
+
+
+@kernel
+def controls_of_quarter(mesh, cell, quarter, corners):
+    """The controls of a quarter of a cell."""
+    half, turn = cell[CELL_SIZE] // 2, 2.0 * math.pi / mesh.lattice.shape[1]
+    low, left = quarter // 2, quarter % 2
+    angle = mesh.vertex[corners[3 * low], VERTEX_ANGLE]
+    da = mesh.vertex[corners[3 * low + 3], VERTEX_ANGLE] - angle
+    return Cell(angle, (cell[CELL_COLUMN] + left * half) * turn, da, half * turn)
+
+
+@kernel
+def fill_patches(look, quarter, k):
+    """A quarter's patch at level k and, where nodes lie between levels, at the one before, or at the origin."""
+    landing, corners, patches = look.mesh.landing, look.corners, look.patches
+    low, left = quarter // 2, quarter % 2
+    fill_patch(landing, corners, low, left, k, patches[0])
+    if look.nodes.bins.aligned:
+        return
+    if k > 0:
+        fill_patch(landing, corners, low, left, k - 1, patches[1])
+    else:
+        origin = look.sweep.launch.origin
+        patches[1, :, 0], patches[1, :, 1] = origin.x, origin.y
+        patches[1, 4:] = 0.0
+
+
+@kernel
+def look_into_quarter(look, cell, quarter, may_halve, rows, count):
+    """Guesses for the nodes under a quarter of a cell, as `guess_in_patch` has them.
+
+    Not at levels where it is too bent for a guess, if it may be halved: returns those, as bits, and the count.
+    """
+    controls = controls_of_quarter(look.mesh, cell, quarter, look.corners)
+    levels, z = look.levels, look.sweep.launch.origin.z
+    bent = 0
+    for k in range(levels.height.size):
+        if not (cell[CELL_LEVELS] >> k) & 1:
+            continue
+        fill_patches(look, quarter, k)
+        if may_halve and wants_halving(look.nodes, levels.layer[k], look.patches):
+            bent |= 1 << k
+            continue
+        slab = Slab(levels.layer[k], levels.height[k - 1] if k > 0 else z, levels.height[k])
+        count = guess_in_patch(look.nodes, slab, z, controls, look.patches, look.sweep.task, rows, count)
+    return bent, count
+
+
+@kernel
+def look_into_cell(look, cell, may_halve, quarters, rows, count):
+    """Look into the quarters of a cell; those that are too bent into `quarters` (4, 4).
+
+    Returns how many of them there are, and of guesses.
+    """
+    for corner in range(CORNERS):
+        i, j = corner_of(look.mesh, cell, corner)
+        look.corners[corner] = look.mesh.lattice[i, j]
+    half = cell[CELL_SIZE] // 2
+    waiting = 0
+    for quarter in range(4):
+        bent, count = look_into_quarter(look, cell, quarter, may_halve, rows, count)
+        if bent:
+            quarters[waiting, CELL_ROW] = cell[CELL_ROW] + quarter // 2 * half
+            quarters[waiting, CELL_COLUMN] = cell[CELL_COLUMN] + quarter % 2 * half
+            quarters[waiting, CELL_SIZE], quarters[waiting, CELL_LEVELS] = half, bent
             waiting += 1
-    vertex = np.empty((512, 3))
-    landing = np.empty((512, 2 * reached))
-    corners = np.empty(9, np.int64)
-    patches = np.empty((3, 6, 2))
-    vertices = 0
-    done = 0
-    generation = 0
+    return waiting, count
+
+
+@making
+def look_into_cells(look, cells, first, last, may_halve, guesses):
+    """Look into cells first..last - 1: (cells, how many there are now, guesses).
+
+    Quarters that are too bent join the cells, to be halved in their turn.
+    """
+    rows, known = guesses
+    waiting = last
+    for c in range(first, last):
+        if waiting + 4 > cells.shape[0]:
+            cells = longer(cells, waiting + 4)
+        more, count = look_into_cell(look, cells[c], may_halve, cells[waiting : waiting + 4], rows, known)
+        if count >= rows.shape[0]:
+            rows = longer(rows, count + 1)
+            more, count = look_into_cell(look, cells[c], may_halve, cells[waiting : waiting + 4], rows, known)
+        waiting, known = waiting + more, count
+    return cells, waiting, Guesses(rows, known)
+
+
+@making
+def fan_guesses(medium, steering, nodes, sweep, guesses, lanes):
+    """First guesses for the wanted nodes that a sweep may pass over, added to the guesses that are there.
+
+    One generation of cells after another: their vertices fly, then their quarters are looked into.
+    """
+    levels = levels_in_reach(medium.polar, nodes.bins, sweep)
+    launch, reached = sweep.launch, levels.height.size
+    if reached == 0:
+        return guesses
+    rows = np.empty(steering.angles)
+    # between levels, the nodes of the first layer may lie as near as they like
+    nearest = abs(levels.height[0] - launch.origin.z) if nodes.bins.aligned else 0.0
+    if not fan_rows(medium.polar, launch.direction, nearest, sweep.horizon, rows):
+        return guesses
+    mesh = coarsest_mesh(steering, rows, reached)
+    cells = np.empty((rows.size * steering.headings, 4), np.int64)
+    patches, corners = np.empty((3, 6, 2)), np.empty(CORNERS, np.int64)
+    waiting = coarsest_cells(medium.polar, nodes.bins, sweep, levels, mesh, cells)
+    done, vertices, generation = 0, 0, 0
     while done < waiting:
-        # halve the cells that wait: their vertices, where they are not there
-        last = waiting
+        most = vertices + CORNERS * (waiting - done)
+        vertex, landing = longer(mesh.vertex, most), longer(mesh.landing, most)
+        mesh = Mesh(rows, mesh.unit, mesh.lattice, vertex, landing)
         new = vertices
-        for c in range(done, last):
-            half = cells[c, SIZE] // 2
-            top = 0
-            while (cells[c, LEVELS] >> top) > 0:
-                top += 1
-            vertex, landing = longer(vertex, vertices + 9), longer(landing, vertices + 9)
-            for corner in range(9):
-                i = cells[c, ROW] + corner // 3 * half
-                j = (cells[c, COLUMN] + corner % 3 * half) % lattice.shape[1]
-                one = lattice[i, j]
-                if one < 0:
-                    lattice[i, j] = vertices
-                    row = min(i // unit, row_count - 2)
-                    share = i / unit - row
-                    vertex[vertices, 0] = (1.0 - share) * rows[row] + share * rows[row + 1]
-                    vertex[vertices, 1] = j * turn
-                    vertex[vertices, THROUGH] = top
-                    vertices += 1
-                elif one >= new:
-                    vertex[one, THROUGH] = max(vertex[one, THROUGH], top)
-        land_on_levels(flow, polar, direction, x, y, z, t, levels, vertex, new, vertices, dt, landing, lanes)
-        # their quarters wait for another generation, or are looked into
-        for c in range(done, last):
-            half = cells[c, SIZE] // 2
-            for corner in range(9):
-                j = (cells[c, COLUMN] + corner % 3 * half) % lattice.shape[1]
-                corners[corner] = lattice[cells[c, ROW] + corner // 3 * half, j]
-            for quarter in range(4):
-                low, left_of = quarter // 2, quarter % 2
-                still = 0
-                angle = vertex[corners[3 * low], 0]
-                da = vertex[corners[3 * low + 3], 0] - angle
-                for k in range(reached):
-                    if not (cells[c, LEVELS] >> k) & 1:
-                        continue
-                    fill_patch(landing, corners, low, left_of, k, patches[0])
-                    if not bins.aligned:
-                        if k > 0:
-                            fill_patch(landing, corners, low, left_of, k - 1, patches[1])
-                        else:
-                            patches[1, :, 0], patches[1, :, 1] = x, y
-                            patches[1, 4:] = 0.0
-                    if generation < steering.generations and wants_halving(
-                        bins, layers[k], position, wanted, patches
-                    ):
-                        still |= 1 << k
-                        continue
-                    start = levels[k - 1] if k > 0 else z
-                    guesses, count = guess_in_patch(
-                        bins, layers[k], start, levels[k], position, wanted, z, patches, task, angle, da,
-                        (cells[c, COLUMN] + left_of * half) * turn, half * turn, guesses, count,
-                    )  # fmt: skip
-                if still:
-                    cells = longer(cells, waiting + 1)
-                    cell = cells[waiting]
-                    cell[ROW], cell[COLUMN] = cells[c, ROW] + low * half, cells[c, COLUMN] + left_of * half
-                    cell[SIZE], cell[LEVELS] = half, still
-                    waiting += 1
-        done = last
+        for c in range(done, waiting):
+            vertices = add_vertices(mesh, cells[c], new, vertices)
+        land_on_levels(medium, launch, levels.height, vertex, landing, new, vertices, lanes)
+        look = Look(nodes, sweep, levels, mesh, patches, corners)
+        first, done = done, waiting
+        may_halve = generation < steering.generations
+        cells, waiting, guesses = look_into_cells(look, cells, first, done, may_halve, guesses)
         generation += 1
-    return guesses, count
+    return guesses

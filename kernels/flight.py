@@ -6,13 +6,28 @@ import numpy as np
 
 from .cache import inlined, kernel, making
 from .flow import contains_box
-from .motion import LANE_ROWS, LANES, H, T, U, V, W, X, Y, Z, rk4_lanes
+from .motion import (
+    LANE_ROWS,
+    LANE_STEP,
+    LANE_T,
+    LANE_U,
+    LANE_V,
+    LANE_W,
+    LANE_X,
+    LANE_Y,
+    LANE_Z,
+    LANES,
+    rk4_lanes,
+)
+from .place import Pair, Place
 
-_ROWS = range(LANE_ROWS, LANE_ROWS + 6)
-LEFT, LAST = _ROWS[:2]
-"""Rows of a lane beyond `motion`'s own: steps that are left, and the length of the last one [s]."""
-X_LO, X_HI, Y_LO, Y_HI = _ROWS[2:]
+_ROWS = range(LANE_ROWS, LANE_ROWS + 14)
+LANE_LEFT, LANE_LAST = _ROWS[:2]
+"""Rows of a lane beyond `motion`'s: steps that are left, and the length of the last one [s]."""
+LANE_X_LO, LANE_X_HI, LANE_Y_LO, LANE_Y_HI = _ROWS[2:6]
 """The box [m] about the places that `widen` has seen."""
+START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z, GOAL_T = _ROWS[6:]
+"""The ends of the flight's leg, where it has one: `keep_ends` writes them, `ends_of` reads them."""
 FLIGHT_ROWS = _ROWS.stop
 
 
@@ -20,16 +35,31 @@ FLIGHT_ROWS = _ROWS.stop
 def hangar(rows):
     """Lanes of `rows` rows, all at rest: (rows, LANES)."""
     lanes = np.zeros((rows, LANES))
-    lanes[LEFT] = math.inf
+    lanes[LANE_LEFT] = math.inf
     return lanes
 
 
 @inlined
-def place(lanes, n, x, y, z, t, u, v, w):
-    """Put lane n at a place [m] and time [s], with a velocity through water [m/s]."""
-    lanes[X, n], lanes[Y, n], lanes[Z, n], lanes[T, n] = x, y, z, t
-    lanes[U, n], lanes[V, n], lanes[W, n] = u, v, w
-    lanes[X_LO, n], lanes[X_HI, n], lanes[Y_LO, n], lanes[Y_HI, n] = x, x, y, y
+def place(lanes, n, at, through):
+    """Put lane n at a Place, with a control's velocity through water."""
+    lanes[LANE_X, n], lanes[LANE_Y, n], lanes[LANE_Z, n], lanes[LANE_T, n] = at.x, at.y, at.z, at.t
+    lanes[LANE_U, n], lanes[LANE_V, n], lanes[LANE_W, n] = through.u, through.v, through.w
+    lanes[LANE_X_LO, n], lanes[LANE_X_HI, n], lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n] = at.x, at.x, at.y, at.y
+
+
+@inlined
+def keep_ends(lanes, n, pair):
+    """Note the ends of lane n's leg."""
+    p, q = pair
+    lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n] = p.x, p.y, p.z, p.t
+    lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n], lanes[GOAL_T, n] = q.x, q.y, q.z, q.t
+
+
+@inlined
+def ends_of(lanes, n):
+    """The ends of lane n's leg."""
+    start = Place(lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n])
+    return Pair(start, Place(lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n], lanes[GOAL_T, n]))
 
 
 @inlined
@@ -37,28 +67,28 @@ def fly_for(lanes, n, duration, dt):
     """Let lane n fly for a duration [s], steps of `dt` and a last, shorter one; below 0 back in time."""
     step = math.copysign(dt, duration)
     full = math.ceil(duration / step) - 1.0
-    lanes[LAST, n] = duration - full * step
-    lanes[LEFT, n] = full + 1.0
-    lanes[H, n] = step if full > 0.0 else lanes[LAST, n]
+    lanes[LANE_LAST, n] = duration - full * step
+    lanes[LANE_LEFT, n] = full + 1.0
+    lanes[LANE_STEP, n] = step if full > 0.0 else lanes[LANE_LAST, n]
 
 
 @inlined
 def rest(lanes, n):
     """Take lane n out of the air."""
-    lanes[LEFT, n], lanes[H, n] = math.inf, 0.0
+    lanes[LANE_LEFT, n], lanes[LANE_STEP, n] = math.inf, 0.0
 
 
 @kernel
 def advance(flow, lanes):
-    """One RK4 step of every lane in the air; a lane whose LEFT is 0 has landed."""
+    """One RK4 step of every lane in the air; a lane whose LANE_LEFT is 0 has landed."""
     rk4_lanes(flow, lanes)
     flat = lanes.reshape(-1)
     for n in range(LANES):
-        left = flat[np.uintp(LEFT * LANES + n)] - 1.0
-        flat[np.uintp(LEFT * LANES + n)] = left
+        left = flat[np.uintp(LANE_LEFT * LANES + n)] - 1.0
+        flat[np.uintp(LANE_LEFT * LANES + n)] = left
         # the compiler makes a selection of this, not a branch
-        flat[np.uintp(H * LANES + n)] = (
-            flat[np.uintp(LAST * LANES + n)] if left == 1.0 else flat[np.uintp(H * LANES + n)]
+        flat[np.uintp(LANE_STEP * LANES + n)] = (
+            flat[np.uintp(LANE_LAST * LANES + n)] if left == 1.0 else flat[np.uintp(LANE_STEP * LANES + n)]
         )
 
 
@@ -66,12 +96,13 @@ def advance(flow, lanes):
 def widen(lanes):
     """Let the boxes hold where the lanes are."""
     for n in range(LANES):
-        lanes[X_LO, n], lanes[X_HI, n] = min(lanes[X_LO, n], lanes[X, n]), max(lanes[X_HI, n], lanes[X, n])
-        lanes[Y_LO, n], lanes[Y_HI, n] = min(lanes[Y_LO, n], lanes[Y, n]), max(lanes[Y_HI, n], lanes[Y, n])
+        x, y = lanes[LANE_X, n], lanes[LANE_Y, n]
+        lanes[LANE_X_LO, n], lanes[LANE_X_HI, n] = min(lanes[LANE_X_LO, n], x), max(lanes[LANE_X_HI, n], x)
+        lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n] = min(lanes[LANE_Y_LO, n], y), max(lanes[LANE_Y_HI, n], y)
 
 
 @kernel
 def stayed_inside(flow, lanes, n, t, duration):
     """Whether lane n's box since t [s] is known to lie where the flow is known."""
-    x_lo, x_hi, y_lo, y_hi = lanes[X_LO, n], lanes[X_HI, n], lanes[Y_LO, n], lanes[Y_HI, n]
-    return contains_box(flow, x_lo, x_hi, y_lo, y_hi, t, t + duration)
+    x_lo, x_hi = lanes[LANE_X_LO, n], lanes[LANE_X_HI, n]
+    return contains_box(flow, x_lo, x_hi, lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n], t, t + duration)

@@ -1,9 +1,8 @@
 """Flows: the horizontal current (u, v) [m/s] at (x, y, z) [m] and time t [s]; w is zero.
 
-A flow is a flat NamedTuple; `velocity(flow, x, y, z, t)` is the one way to read it. It dispatches on the
-tuple's class, at compile time inside kernels. Every class ends in the same fields: the box
-`x_lo, x_hi, y_lo, y_hi` [m] and the time span `t_lo, t_hi` [s] in which the flow is known, an upper bound
-`max_speed` [m/s], and `length_scale` [m], over which it varies.
+A flow is a NamedTuple; `velocity(flow, x, y, z, t)` is the one way to read it. It dispatches on the tuple's
+class, at compile time inside kernels: what each class can do stands in ABILITIES. The last field of every class
+is its `extent`.
 """
 
 import math
@@ -11,10 +10,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
-from .cache import BARE, entry_point, inlined, kernel
+from .cache import entry_point, in_kernels, inlined, kernel
 from .interpolate import pair_between
 
 JUST_BELOW = 1.0 - 2.0**-52
@@ -22,6 +20,24 @@ JUST_BELOW = 1.0 - 2.0**-52
 
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
+Numbers = NDArray[np.int64]
+"""Of nodes, pairs and where rows begin."""
+
+
+class Extent(NamedTuple):
+    """The box [m] and the time span [s] in which a flow is known.
+
+    And an upper bound `max_speed` [m/s] of its speed there, and `length_scale` [m], over which it varies.
+    """
+
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+    t_lo: float
+    t_hi: float
+    max_speed: float
+    length_scale: float
 
 
 class Uniform(NamedTuple):
@@ -29,18 +45,11 @@ class Uniform(NamedTuple):
 
     u: float
     v: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 class Vortices(NamedTuple):
-    """A sum of Gaussian vortices with a Gaussian depth profile; six arrays of shape (n,)."""
+    """A sum of Gaussian vortices with a Gaussian depth profile; arrays of shape (n,)."""
 
     x: Array
     y: Array
@@ -48,14 +57,7 @@ class Vortices(NamedTuple):
     speed: Array
     depth: Array
     thickness: Array
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 class Gyre(NamedTuple):
@@ -67,14 +69,7 @@ class Gyre(NamedTuple):
     amplitude: float
     epsilon: float
     period: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 class Rankine(NamedTuple):
@@ -84,14 +79,7 @@ class Rankine(NamedTuple):
     y: float
     radius: float
     speed: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 class Jet(NamedTuple):
@@ -100,14 +88,7 @@ class Jet(NamedTuple):
     y: float
     width: float
     speed: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 class Grid(NamedTuple):
@@ -123,14 +104,7 @@ class Grid(NamedTuple):
     per_y: float
     z_first: float
     per_z: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 class OceanGrid(NamedTuple):
@@ -153,14 +127,7 @@ class OceanGrid(NamedTuple):
     index_map: Array
     per_x: float
     per_y: float
-    x_lo: float
-    x_hi: float
-    y_lo: float
-    y_hi: float
-    t_lo: float
-    t_hi: float
-    max_speed: float
-    length_scale: float
+    extent: Extent
 
 
 Flow = Uniform | Vortices | Gyre | Rankine | Jet | Grid | OceanGrid
@@ -235,8 +202,8 @@ def _slot(at, points, slots, slots_per_unit):
 def _grid(flow, x, y, z, t):
     values = flow.values
     k, c = _cell((z - flow.z_first) * flow.per_z, values.shape[0])
-    i, a = _cell((x - flow.x_lo) * flow.per_x, values.shape[1])
-    j, b = _cell((y - flow.y_lo) * flow.per_y, values.shape[2])
+    i, a = _cell((x - flow.extent.x_lo) * flow.per_x, values.shape[1])
+    j, b = _cell((y - flow.extent.y_lo) * flow.per_y, values.shape[2])
     return pair_between(values, (k, i, j), (c, a, b))
 
 
@@ -250,7 +217,7 @@ def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
 
 def _ocean_grid(flow, x, y, z, t):
     values = flow.values
-    at_i, at_j = grid_index(flow.index_map, x, y, flow.x_lo, flow.y_lo, flow.per_x, flow.per_y)
+    at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
     i, a = _cell(at_i, values.shape[2])
     j, b = _cell(at_j, values.shape[3])
     k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
@@ -259,41 +226,29 @@ def _ocean_grid(flow, x, y, z, t):
 
 
 def _in_box(flow, x, y, t):
-    return flow.x_lo <= x <= flow.x_hi and flow.y_lo <= y <= flow.y_hi and flow.t_lo <= t <= flow.t_hi
+    known = flow.extent
+    return known.x_lo <= x <= known.x_hi and known.y_lo <= y <= known.y_hi and known.t_lo <= t <= known.t_hi
 
 
 def _in_ocean_grid(flow, x, y, t):
-    i, j = grid_index(flow.index_map, x, y, flow.x_lo, flow.y_lo, flow.per_x, flow.per_y)
-    in_box = flow.x_lo <= x <= flow.x_hi and flow.y_lo <= y <= flow.y_hi and flow.t_lo <= t <= flow.t_hi
+    known = flow.extent
+    i, j = grid_index(flow.index_map, x, y, known.x_lo, known.y_lo, flow.per_x, flow.per_y)
+    in_box = known.x_lo <= x <= known.x_hi and known.y_lo <= y <= known.y_hi and known.t_lo <= t <= known.t_hi
     return in_box and 0.0 <= i <= flow.values.shape[2] - 1 and 0.0 <= j <= flow.values.shape[3] - 1
 
 
-_VELOCITY: dict[type, Callable[..., Any]] = {
-    Uniform: _uniform,
-    Vortices: _vortices,
-    Gyre: _gyre,
-    Rankine: _rankine,
-    Jet: _jet,
-    Grid: _grid,
-    OceanGrid: _ocean_grid,
-}
-_CONTAINS: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _in_box) | {OceanGrid: _in_ocean_grid}
-
-
 def _box_in_box(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
-    across = flow.x_lo <= x_lo and x_hi <= flow.x_hi and flow.y_lo <= y_lo and y_hi <= flow.y_hi
-    return across and flow.t_lo <= t_lo and t_hi <= flow.t_hi
+    known = flow.extent
+    across = known.x_lo <= x_lo and x_hi <= known.x_hi and known.y_lo <= y_lo and y_hi <= known.y_hi
+    return across and known.t_lo <= t_lo and t_hi <= known.t_hi
 
 
 def _unsure(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
     return False
 
 
-_CONTAINS_BOX: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _box_in_box) | {OceanGrid: _unsure}
-
-
 def _steady_carry(flow, z):
-    return flow.max_speed * z
+    return flow.extent.max_speed * z
 
 
 def _grid_carry(flow, z):
@@ -305,7 +260,41 @@ def _grid_carry(flow, z):
     return flow.level_carry[k] + (c * (low + 0.5 * c * (high - low)) + beyond * speed) / flow.per_z
 
 
-_CARRY: dict[type, Callable[..., Any]] = dict.fromkeys(_VELOCITY, _steady_carry) | {Grid: _grid_carry}
+class Abilities(NamedTuple):
+    """What a class of flow can do: the functions of the same names, for its own fields."""
+
+    velocity: Callable[..., Any]
+    contains: Callable[..., Any] = _in_box
+    contains_box: Callable[..., Any] = _box_in_box
+    carry: Callable[..., Any] = _steady_carry
+
+
+ABILITIES: dict[type, Abilities] = {
+    Uniform: Abilities(_uniform),
+    Vortices: Abilities(_vortices),
+    Gyre: Abilities(_gyre),
+    Rankine: Abilities(_rankine),
+    Jet: Abilities(_jet),
+    Grid: Abilities(_grid, carry=_grid_carry),
+    OceanGrid: Abilities(_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure),
+}
+
+
+def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float]:
+    """Current (u, v) [m/s], eastward and northward in the local frame, at (x, y, z) [m] and t [s]."""
+    return ABILITIES[type(flow)].velocity(flow, x, y, z, t)
+
+
+def contains(flow: Flow, x: float, y: float, t: float) -> bool:
+    """Whether the flow is known at (x, y) [m] and time t [s]."""
+    return ABILITIES[type(flow)].contains(flow, x, y, t)
+
+
+def contains_box(
+    flow: Flow, x_lo: float, x_hi: float, y_lo: float, y_hi: float, t_lo: float, t_hi: float
+) -> bool:
+    """Whether the flow is known to be known in a whole box [m, s]; a quick look before a close one."""
+    return ABILITIES[type(flow)].contains_box(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
 
 
 def carry(flow: Flow, z: float) -> float:
@@ -314,44 +303,18 @@ def carry(flow: Flow, z: float) -> float:
     A path that passes from z_1 to z_2 at a vertical speed w is carried no further by the flow than
     |carry(z_2) - carry(z_1)| / |w|.
     """
-    return _CARRY[type(flow)](flow, z)
+    return ABILITIES[type(flow)].carry(flow, z)
 
 
-@overload(carry, jit_options=BARE)
-def _carry_in_kernels(flow, z):
-    return _CARRY.get(getattr(flow, "instance_class", type(None)))
+for _ability in (velocity, contains, contains_box, carry):
+    in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
 
 
-def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float]:
-    """Current (u, v) [m/s], eastward and northward in the local frame, at (x, y, z) [m] and t [s]."""
-    return _VELOCITY[type(flow)](flow, x, y, z, t)
-
-
-def contains(flow: Flow, x: float, y: float, t: float) -> bool:
-    """Whether the flow is known at (x, y) [m] and time t [s]."""
-    return _CONTAINS[type(flow)](flow, x, y, t)
-
-
-def contains_box(
-    flow: Flow, x_lo: float, x_hi: float, y_lo: float, y_hi: float, t_lo: float, t_hi: float
-) -> bool:
-    """Whether the flow is known to be known in a whole box [m, s]; a quick look before a close one."""
-    return _CONTAINS_BOX[type(flow)](flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
-
-
-@overload(contains_box, jit_options=BARE)
-def _contains_box_in_kernels(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
-    return _CONTAINS_BOX.get(getattr(flow, "instance_class", type(None)))
-
-
-@overload(velocity, jit_options=BARE)
-def _velocity_in_kernels(flow, x, y, z, t):
-    return _VELOCITY.get(getattr(flow, "instance_class", type(None)))
-
-
-@overload(contains, jit_options=BARE)
-def _contains_in_kernels(flow, x, y, t):
-    return _CONTAINS.get(getattr(flow, "instance_class", type(None)))
+def fields_of(flow: tuple[Any, ...]) -> dict[str, Any]:
+    """A flow's fields (or a terrain's) by name, those of its extent among them."""
+    fields: dict[str, Any] = flow._asdict()  # type: ignore[attr-defined]
+    extent = fields.pop("extent", None)
+    return fields if extent is None else fields | extent._asdict()
 
 
 @kernel

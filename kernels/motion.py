@@ -7,6 +7,7 @@ import numpy as np
 
 from .cache import entry_point, inlined, kernel, making
 from .flow import carry, contains, velocity
+from .place import Place
 from .terrain import allowed, open_between
 
 
@@ -19,11 +20,14 @@ class Integration(NamedTuple):
 
 
 @inlined
-def rk4_step(flow, x, y, z, t, u, v, w, dt):
+def rk4_step(flow, at, through, dt):
     """One RK4 step of dx/dt = flow + (u, v, w), the velocity through water [m/s]; returns x, y [m].
 
-    Depth is linear in time, since the flow has no vertical part.
+    From a place `at`; `through` is a Control, or what has its u, v, w. Depth is linear in time, since the flow
+    has no vertical part.
     """
+    x, y, z, t = at.x, at.y, at.z, at.t
+    u, v, w = through.u, through.v, through.w
     half = 0.5 * dt
     u1, v1 = velocity(flow, x, y, z, t)
     u2, v2 = velocity(flow, x + half * (u1 + u), y + half * (v1 + v), z + half * w, t + half)
@@ -35,17 +39,17 @@ def rk4_step(flow, x, y, z, t, u, v, w, dt):
 
 
 @inlined
-def along_segment(ax, ay, az, bx, by, bz, x, y, z):
-    """Share of the segment a -> b, from 0 to 1, and distance [m], at the point nearest to (x, y, z)."""
-    dx = bx - ax
-    dy = by - ay
-    dz = bz - az
+def along_segment(a, b, q):
+    """Share of the segment a -> b, from 0 to 1, and distance [m], at the point nearest to q; places all."""
+    dx = b.x - a.x
+    dy = b.y - a.y
+    dz = b.z - a.z
     # a segment has length: w is never zero
-    share = ((x - ax) * dx + (y - ay) * dy + (z - az) * dz) / (dx * dx + dy * dy + dz * dz)
+    share = ((q.x - a.x) * dx + (q.y - a.y) * dy + (q.z - a.z) * dz) / (dx * dx + dy * dy + dz * dz)
     share = min(max(share, 0.0), 1.0)
-    ex = ax + share * dx - x
-    ey = ay + share * dy - y
-    ez = az + share * dz - z
+    ex = a.x + share * dx - q.x
+    ey = a.y + share * dy - q.y
+    ez = a.z + share * dz - q.z
     return share, math.sqrt(ex * ex + ey * ey + ez * ez)
 
 
@@ -56,78 +60,82 @@ def arrival_window(w, rise, tolerance):
 
 
 @kernel
-def closest_approach(flow, x, y, z, t, u, v, w, x_q, y_q, z_q, integration):
-    """Miss [m] and time since departure [s] of the path's closest approach to q, along its segments.
+def closest_approach(flow, pair, through, integration):
+    """Miss [m] and time since departure [s] of the path's closest approach to its goal, along its segments.
 
     Equal to the literal loop over all steps wherever that loop hits: outside the arrival window the
     depth alone is further away than the tolerance. A path that leaves the flow ends; so does
-    one that the flow, at its fastest, could no longer carry to q in time. inf is the miss of a path that
+    one that the flow, at its fastest, could no longer carry to the goal in time. inf is the miss of a path that
     never came into the window.
     """
-    dt = integration.dt
-    first, last = arrival_window(w, z_q - z, integration.tolerance)
+    start, goal = pair
+    dt, u, v, w = integration.dt, through.u, through.v, through.w
+    first, last = arrival_window(w, goal.z - start.z, integration.tolerance)
     window_opens = int(first / dt)
     window_closes = min(integration.steps, int(last / dt) + 1)
     # what the control itself adds between the window's ends, and what may still hit
     slack = math.hypot(u, v) * (window_closes * dt - first) + integration.tolerance
-    carry_end = carry(flow, z + window_closes * dt * w)
+    carry_end = carry(flow, start.z + window_closes * dt * w)
     miss = math.inf
     duration = math.inf
+    here = start
     for n in range(window_closes):
-        if not contains(flow, x, y, t + n * dt):
+        if not contains(flow, here.x, here.y, here.t):
             break
-        z_now = z + n * dt * w
         left = (window_closes - n) * dt
-        off_x = x_q - (x + u * left)
-        off_y = y_q - (y + v * left)
-        far = abs((carry_end - carry(flow, z_now)) / w) + slack
+        off_x = goal.x - (here.x + u * left)
+        off_y = goal.y - (here.y + v * left)
+        far = abs((carry_end - carry(flow, here.z)) / w) + slack
         if off_x * off_x + off_y * off_y > far * far:
             break
-        x_next, y_next = rk4_step(flow, x, y, z_now, t + n * dt, u, v, w, dt)
+        x, y = rk4_step(flow, here, through, dt)
+        there = Place(x, y, start.z + (n + 1) * dt * w, start.t + (n + 1) * dt)
         if n >= window_opens:
-            share, distance = along_segment(x, y, z_now, x_next, y_next, z + (n + 1) * dt * w, x_q, y_q, z_q)
+            share, distance = along_segment(here, there, goal)
             if distance < miss:
                 miss = distance
                 duration = (n + share) * dt
-        x, y = x_next, y_next
+        here = there
     return miss, duration
 
 
 @making
-def trace(flow, x, y, z, t, u, v, w, duration, dt):
+def trace(flow, start, through, duration, dt):
     """The path as rows [t, x, y, z]: every full step of `dt`, and the last, shorter one to `duration`."""
     full = int(duration / dt)
     rows = np.empty((full + 2 if full * dt < duration else full + 1, 4))
+    x, y = start.x, start.y
     for n in range(rows.shape[0]):
         since = min(n * dt, duration)
-        rows[n] = (t + since, x, y, z + since * w)
-        step = min(dt, duration - since)
-        x, y = rk4_step(flow, x, y, z + since * w, t + since, u, v, w, step)
+        here = Place(x, y, start.z + since * through.w, start.t + since)
+        rows[n] = (here.t, x, y, here.z)
+        x, y = rk4_step(flow, here, through, min(dt, duration - since))
     return rows
 
 
 @entry_point()
-def traced(flow, x, y, z, t, u, v, w, duration, dt):
+def traced(flow, start, through, duration, dt):
     """`trace`, for callers from Python."""
-    return trace(flow, x, y, z, t, u, v, w, duration, dt)
+    return trace(flow, start, through, duration, dt)
 
 
 @making
-def stays_inside(flow, x, y, z, t, u, v, w, duration, dt):
+def stays_inside(flow, start, through, duration, dt):
     """Whether every step of the leg begins where the flow is known."""
-    rows = trace(flow, x, y, z, t, u, v, w, duration, dt)
+    rows = trace(flow, start, through, duration, dt)
     inside = True
     for n in range(rows.shape[0] - 1):
-        inside &= contains(flow, rows[n, 1], rows[n, 2], rows[n, 0])
+        t, x, y, _ = rows[n]
+        inside &= contains(flow, x, y, t)
     return inside
 
 
 @making
-def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
+def is_clear(flow, terrain, start, through, duration, dt, spacing):
     """Whether the whole leg stays where `terrain` allows a glider to be, looked at every `spacing` [m]."""
-    if open_between(terrain, z, z + w * duration):
+    if open_between(terrain, start.z, start.z + through.w * duration):
         return True
-    rows = trace(flow, x, y, z, t, u, v, w, duration, dt)
+    rows = trace(flow, start, through, duration, dt)
     for n in range(rows.shape[0] - 1):
         _, ax, ay, az = rows[n]
         _, bx, by, bz = rows[n + 1]
@@ -141,7 +149,7 @@ def is_clear(flow, terrain, x, y, z, t, u, v, w, duration, dt, spacing):
 
 LANES = 32
 """Trajectories in flight together: enough to hide the latency of the grid's loads."""
-X, Y, Z, T, U, V, W, H = range(8)
+LANE_X, LANE_Y, LANE_Z, LANE_T, LANE_U, LANE_V, LANE_W, LANE_STEP = range(8)
 """Rows of lanes (LANE_ROWS or more, LANES): place [m], time [s], velocity through water [m/s], step [s]."""
 _U1, _V1, _U2, _V2, _U3, _V3, _XS, _YS = range(8, 16)
 LANE_ROWS = 16
@@ -152,13 +160,13 @@ LANE_ROWS = 16
 def _slopes(flow, flat, x, y, share, u, v):
     """Currents of all lanes at rows x, y into rows u, v, at `share` of the step in depth and time."""
     for n in range(LANES):
-        along = share * flat[np.uintp(H * LANES + n)]
+        along = share * flat[np.uintp(LANE_STEP * LANES + n)]
         flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = velocity(
             flow,
             flat[np.uintp(x * LANES + n)],
             flat[np.uintp(y * LANES + n)],
-            flat[np.uintp(Z * LANES + n)] + along * flat[np.uintp(W * LANES + n)],
-            flat[np.uintp(T * LANES + n)] + along,
+            flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
+            flat[np.uintp(LANE_T * LANES + n)] + along,
         )
 
 
@@ -166,19 +174,19 @@ def _slopes(flow, flat, x, y, share, u, v):
 def _move(flat, share, u, v):
     """Stage points into rows _XS, _YS: a `share` of the step along the slopes in rows u, v."""
     for n in range(LANES):
-        along = share * flat[np.uintp(H * LANES + n)]
-        flat[np.uintp(_XS * LANES + n)] = flat[np.uintp(X * LANES + n)] + along * (
-            flat[np.uintp(u * LANES + n)] + flat[np.uintp(U * LANES + n)]
+        along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+        flat[np.uintp(_XS * LANES + n)] = flat[np.uintp(LANE_X * LANES + n)] + along * (
+            flat[np.uintp(u * LANES + n)] + flat[np.uintp(LANE_U * LANES + n)]
         )
-        flat[np.uintp(_YS * LANES + n)] = flat[np.uintp(Y * LANES + n)] + along * (
-            flat[np.uintp(v * LANES + n)] + flat[np.uintp(V * LANES + n)]
+        flat[np.uintp(_YS * LANES + n)] = flat[np.uintp(LANE_Y * LANES + n)] + along * (
+            flat[np.uintp(v * LANES + n)] + flat[np.uintp(LANE_V * LANES + n)]
         )
 
 
 @kernel
 def _sum(flat, place, through, u1, u2, u3, u4):
     for n in range(LANES):
-        flat[np.uintp(place * LANES + n)] += flat[np.uintp(H * LANES + n)] * (
+        flat[np.uintp(place * LANES + n)] += flat[np.uintp(LANE_STEP * LANES + n)] * (
             flat[np.uintp(through * LANES + n)]
             + (
                 flat[np.uintp(u1 * LANES + n)]
@@ -191,21 +199,23 @@ def _sum(flat, place, through, u1, u2, u3, u4):
 
 @kernel
 def rk4_lanes(flow, lanes):
-    """`rk4_step` for LANES trajectories at once, each with its own step H, in place; the same bits.
+    """`rk4_step` for LANES trajectories at once, each with a step of its lane, in place; the same bits.
 
-    A lane with H = 0 stands still; H < 0 goes back in time. One flat array with constant offsets lets the
-    compiler see that rows do not overlap: 1.6 times as fast as separate arrays.
+    A lane whose step is 0 stands still; one below 0 goes back in time. One flat array with constant offsets lets
+    the compiler see that rows do not overlap: 1.6 times as fast as separate arrays.
     """
     flat = lanes.reshape(-1)
-    _slopes(flow, flat, X, Y, 0.0, _U1, _V1)
+    _slopes(flow, flat, LANE_X, LANE_Y, 0.0, _U1, _V1)
     _move(flat, 0.5, _U1, _V1)
     _slopes(flow, flat, _XS, _YS, 0.5, _U2, _V2)
     _move(flat, 0.5, _U2, _V2)
     _slopes(flow, flat, _XS, _YS, 0.5, _U3, _V3)
     _move(flat, 1.0, _U3, _V3)
     _slopes(flow, flat, _XS, _YS, 1.0, _XS, _YS)
-    _sum(flat, X, U, _U1, _U2, _U3, _XS)
-    _sum(flat, Y, V, _V1, _V2, _V3, _YS)
+    _sum(flat, LANE_X, LANE_U, _U1, _U2, _U3, _XS)
+    _sum(flat, LANE_Y, LANE_V, _V1, _V2, _V3, _YS)
     for n in range(LANES):
-        flat[np.uintp(Z * LANES + n)] += flat[np.uintp(H * LANES + n)] * flat[np.uintp(W * LANES + n)]
-        flat[np.uintp(T * LANES + n)] += flat[np.uintp(H * LANES + n)]
+        flat[np.uintp(LANE_Z * LANES + n)] += (
+            flat[np.uintp(LANE_STEP * LANES + n)] * flat[np.uintp(LANE_W * LANES + n)]
+        )
+        flat[np.uintp(LANE_T * LANES + n)] += flat[np.uintp(LANE_STEP * LANES + n)]

@@ -7,13 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cache import inlined, kernel, making
-from .flow import Array
+from .flow import Array, Numbers
 
-Index = NDArray[np.int64]
-
-TASK, NODE, ANGLE, HEADING, OUTSIDE, INVERSE = range(6)
+GUESS_TASK, GUESS_NODE, GUESS_ANGLE, GUESS_HEADING, GUESS_OUTSIDE, GUESS_INVERSE = range(6)
 """Columns of a guess: the task it is for, node, glide angle and heading [rad], how far outside its cell, in the
-cell's own units, and from INVERSE on d(angle, heading) / d(x, y), row by row."""
+cell's own units, and from GUESS_INVERSE on d(angle, heading) / d(x, y), row by row."""
 GUESS_COLUMNS = 10
 ALONG_ANGLE, ALONG_HEADING = 4, 5
 """Rows of a patch, after the landings of its four corners: its second derivatives, in the cell's own units."""
@@ -39,8 +37,49 @@ class NodeBins(NamedTuple):
     per_bin: float
     nx: int
     ny: int
-    first: Index
-    node: Index
+    first: Numbers
+    node: Numbers
+
+
+class Nodes(NamedTuple):
+    """Nodes `position` (n, 3) [m], in bins; `wanted` (n,): those that are looked for, all where it is empty."""
+
+    position: Array
+    bins: NodeBins
+    wanted: NDArray[np.bool_]
+
+
+class Guesses(NamedTuple):
+    """First guesses of controls: the first `filled` of `rows` (more than those, GUESS_COLUMNS)."""
+
+    rows: Array
+    filled: int
+
+
+class Box(NamedTuple):
+    """A rectangle [m]."""
+
+    x_lo: float
+    x_hi: float
+    y_lo: float
+    y_hi: float
+
+
+class Cell(NamedTuple):
+    """Controls from `angle` to `angle` + `da` and from `heading` to `heading` + `dh` [rad]."""
+
+    angle: float
+    heading: float
+    da: float
+    dh: float
+
+
+class Slab(NamedTuple):
+    """The `layer` of nodes between the heights `start` and `end` [m], which a fan passes in this order."""
+
+    layer: int
+    start: float
+    end: float
 
 
 @inlined
@@ -51,18 +90,24 @@ def bin_range(low, high, origin, per_bin, count):
     return first, last
 
 
+@inlined
+def is_wanted(nodes, node):
+    """Whether a node is looked for."""
+    return nodes.wanted.size == 0 or nodes.wanted[node]
+
+
 @kernel
-def any_wanted(bins, layer, position, wanted, x_lo, x_hi, y_lo, y_hi):
-    """Whether a wanted node of the layer lies in the rectangle [m]."""
-    i_first, i_last = bin_range(x_lo, x_hi, bins.x_lo, bins.per_bin, bins.nx)
-    j_first, j_last = bin_range(y_lo, y_hi, bins.y_lo, bins.per_bin, bins.ny)
+def any_wanted(nodes, layer, box):
+    """Whether a wanted node of the layer lies in a box."""
+    bins, position = nodes.bins, nodes.position
+    i_first, i_last = bin_range(box.x_lo, box.x_hi, bins.x_lo, bins.per_bin, bins.nx)
+    j_first, j_last = bin_range(box.y_lo, box.y_hi, bins.y_lo, bins.per_bin, bins.ny)
     for i in range(i_first, i_last + 1):
         row = (layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
             node = bins.node[k]
-            if not (x_lo <= position[node, 0] <= x_hi and y_lo <= position[node, 1] <= y_hi):
-                continue
-            if wanted.size == 0 or wanted[node]:
+            x, y = position[node, 0], position[node, 1]
+            if box.x_lo <= x <= box.x_hi and box.y_lo <= y <= box.y_hi and is_wanted(nodes, node):
                 return True
     return False
 
@@ -76,6 +121,12 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
     s = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / det
     r = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / det
     return s, r, det
+
+
+@inlined
+def wider(box, room):
+    """The box with so much more room [m] on every side."""
+    return Box(box.x_lo - room, box.x_hi + room, box.y_lo - room, box.y_hi + room)
 
 
 @making
@@ -112,13 +163,13 @@ def fill_patch(landing, corners, i, j, level, patch):
 
 @kernel
 def _around(bins, patches):
-    """The rectangle about a patch, and about its start where nodes lie between: x_lo, x_hi, y_lo, y_hi [m]."""
+    """The box about a patch, and about its start where nodes lie between."""
     x_lo, x_hi, y_lo, y_hi = math.inf, -math.inf, math.inf, -math.inf
     for end in range(1 if bins.aligned else 2):
         for c in range(4):
             x_lo, x_hi = min(x_lo, patches[end, c, 0]), max(x_hi, patches[end, c, 0])
             y_lo, y_hi = min(y_lo, patches[end, c, 1]), max(y_hi, patches[end, c, 1])
-    return x_lo, x_hi, y_lo, y_hi
+    return Box(x_lo, x_hi, y_lo, y_hi)
 
 
 @kernel
@@ -140,15 +191,15 @@ def _folded(p):
 
 
 @kernel
-def wants_halving(bins, layer, position, wanted, patches):
+def wants_halving(nodes, layer, patches):
     """Whether a patch that is bent or folded has a wanted node within the bend's or the fold's reach."""
     bend = _bend(patches[0])
     folded = _folded(patches[0])
     if bend <= BENT and not folded:
         return False
-    x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
-    room = max(bend, 0.25 * max(x_hi - x_lo, y_hi - y_lo)) if folded else bend
-    return any_wanted(bins, layer, position, wanted, x_lo - room, x_hi + room, y_lo - room, y_hi + room)
+    box = _around(nodes.bins, patches)
+    room = max(bend, 0.25 * max(box.x_hi - box.x_lo, box.y_hi - box.y_lo)) if folded else bend
+    return any_wanted(nodes, layer, wider(box, room))
 
 
 @kernel
@@ -178,55 +229,76 @@ def _solve(p, x, y, s, r):
     return s, r, x_s, x_r, y_s, y_r
 
 
-@making
-def guess_in_patch(
-    bins, layer, start, end, position, wanted, z, patches, task, angle, da, heading, dh, guesses, count
-):
-    """First guesses for the wanted nodes under a patch of (angle, heading) + (da, dh); returns (guesses, count).
+@inlined
+def _in_triangles(p, x, y):
+    """Where (x, y) lies in the nearer of a patch's two triangles: s, r, and how far outside, in its own units."""
+    # lower triangle at corner 0, upper one at corner 3, their legs along angle and heading
+    s, r, low = _inside(p[0, 0], p[0, 1], p[2, 0], p[2, 1], p[1, 0], p[1, 1], x, y)
+    outside = max(0.0, -s, -r, s + r - 1.0) if low != 0.0 else math.inf
+    back_s, back_r, high = _inside(p[3, 0], p[3, 1], p[1, 0], p[1, 1], p[2, 0], p[2, 1], x, y)
+    beyond = max(0.0, -back_s, -back_r, back_s + back_r - 1.0) if high != 0.0 else math.inf
+    if beyond < outside:
+        return 1.0 - back_s, 1.0 - back_r, beyond
+    return s, r, outside
 
-    `patches` (3, 6, 2): the patch at the layer's `end` and at its `start` [m]; the third is scratch.
+
+@kernel
+def _guess(p, x, y, cell, rows, at):
+    """The cell's control that lands on (x, y) by its patch, into rows[at]; False where it is too far outside."""
+    s, r, outside = _in_triangles(p, x, y)
+    if outside > MARGIN:
+        return False
+    s_2, r_2, x_s, x_r, y_s, y_r = _solve(p, x, y, s, r)
+    if abs(s_2 - s) + abs(r_2 - r) < 1.0:
+        s, r = s_2, r_2
+    else:
+        x_s, x_r, y_s, y_r = p[2, 0] - p[0, 0], p[1, 0] - p[0, 0], p[2, 1] - p[0, 1], p[1, 1] - p[0, 1]
+    det = x_s * y_r - x_r * y_s
+    if det == 0.0:
+        return False
+    guess = rows[at]
+    guess[GUESS_OUTSIDE] = outside
+    guess[GUESS_ANGLE], guess[GUESS_HEADING] = cell.angle + s * cell.da, cell.heading + r * cell.dh
+    guess[GUESS_INVERSE], guess[GUESS_INVERSE + 1] = cell.da * y_r / det, -cell.da * x_r / det
+    guess[GUESS_INVERSE + 2], guess[GUESS_INVERSE + 3] = -cell.dh * y_s / det, cell.dh * x_s / det
+    return True
+
+
+@kernel
+def _blend(patches, share):
+    """The third patch, `share` of the way from the second, at a slab's start, to the first, at its end."""
+    for c in range(6):
+        for m in range(2):
+            patches[2, c, m] = patches[1, c, m] + share * (patches[0, c, m] - patches[1, c, m])
+
+
+@kernel
+def guess_in_patch(nodes, slab, z, cell, patches, task, rows, count):
+    """First guesses for the wanted nodes under a patch, into `rows` from `count` on; how many there are now.
+
+    Where there is no room they are only counted, and the last row is spoilt. `patches` (3, 6, 2): the cell's
+    patch at the slab's end and at its start; the third is scratch. `z` [m] is the height of the fan.
     """
-    x_lo, x_hi, y_lo, y_hi = _around(bins, patches)
-    room = MARGIN * max(x_hi - x_lo, y_hi - y_lo)
-    i_first, i_last = bin_range(x_lo - room, x_hi + room, bins.x_lo, bins.per_bin, bins.nx)
-    j_first, j_last = bin_range(y_lo - room, y_hi + room, bins.y_lo, bins.per_bin, bins.ny)
-    p = patches[0] if bins.aligned else patches[2]
+    bins, position = nodes.bins, nodes.position
+    p = patches[0 if bins.aligned else 2]
+    box = _around(bins, patches)
+    box = wider(box, MARGIN * max(box.x_hi - box.x_lo, box.y_hi - box.y_lo))
+    i_first, i_last = bin_range(box.x_lo, box.x_hi, bins.x_lo, bins.per_bin, bins.nx)
+    j_first, j_last = bin_range(box.y_lo, box.y_hi, bins.y_lo, bins.per_bin, bins.ny)
     for i in range(i_first, i_last + 1):
-        row = (layer * bins.nx + i) * bins.ny
+        row = (slab.layer * bins.nx + i) * bins.ny
         for k in range(bins.first[row + j_first], bins.first[row + j_last + 1]):
             node = bins.node[k]
-            x, y = position[node, 0], position[node, 1]
-            if x < x_lo - room or x > x_hi + room or y < y_lo - room or y > y_hi + room:
+            x, y, height = position[node, 0], position[node, 1], position[node, 2]
+            if x < box.x_lo or x > box.x_hi or y < box.y_lo or y > box.y_hi:
                 continue
-            f = (position[node, 2] - start) / (end - start)
-            if position[node, 2] == z or f < 0.0 or f > 1.0 or not (wanted.size == 0 or wanted[node]):
+            share = (height - slab.start) / (slab.end - slab.start)
+            if height == z or share < 0.0 or share > 1.0 or not is_wanted(nodes, node):
                 continue
             if not bins.aligned:
-                for c in range(6):
-                    for m in range(2):
-                        p[c, m] = patches[1, c, m] + f * (patches[0, c, m] - patches[1, c, m])
-            # lower triangle at corner 0, upper one at corner 3, their legs along angle and heading
-            s, r, low = _inside(p[0, 0], p[0, 1], p[2, 0], p[2, 1], p[1, 0], p[1, 1], x, y)
-            outside = max(0.0, -s, -r, s + r - 1.0) if low != 0.0 else math.inf
-            back_s, back_r, high = _inside(p[3, 0], p[3, 1], p[1, 0], p[1, 1], p[2, 0], p[2, 1], x, y)
-            beyond = max(0.0, -back_s, -back_r, back_s + back_r - 1.0) if high != 0.0 else math.inf
-            if beyond < outside:
-                s, r, outside = 1.0 - back_s, 1.0 - back_r, beyond
-            if outside > MARGIN:
-                continue
-            s_2, r_2, x_s, x_r, y_s, y_r = _solve(p, x, y, s, r)
-            if abs(s_2 - s) + abs(r_2 - r) < 1.0:
-                s, r = s_2, r_2
-            else:
-                x_s, x_r, y_s, y_r = p[2, 0] - p[0, 0], p[1, 0] - p[0, 0], p[2, 1] - p[0, 1], p[1, 1] - p[0, 1]
-            det = x_s * y_r - x_r * y_s
-            if det == 0.0:
-                continue
-            guesses = longer(guesses, count + 1)
-            guess = guesses[count]
-            guess[TASK], guess[NODE], guess[OUTSIDE] = task, node, outside
-            guess[ANGLE], guess[HEADING] = angle + s * da, heading + r * dh
-            guess[INVERSE], guess[INVERSE + 1] = da * y_r / det, -da * x_r / det
-            guess[INVERSE + 2], guess[INVERSE + 3] = -dh * y_s / det, dh * x_s / det
-            count += 1
-    return guesses, count
+                _blend(patches, share)
+            at = min(count, rows.shape[0] - 1)
+            if _guess(p, x, y, cell, rows, at):
+                rows[at, GUESS_TASK], rows[at, GUESS_NODE] = task, node
+                count += 1
+    return count

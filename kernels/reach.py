@@ -1,20 +1,45 @@
 """Reach: the exact legs between points and the nodes under their fans; guesses polished, the cheapest kept."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from . import steer
 from .cache import entry_point, kernel, making
-from .control import CLIMB, angle_of_vertical_speed, control_towards, horizontal_speed, vertical_speed
+from .connect import pair_at
+from .control import CLIMB, angle_of_vertical_speed, horizontal_speed, vertical_speed
 from .cost import edge_cost
-from .edges import BLOCKED, CLEARANCE_SPACING, CONNECTED, NO_HIT, Edge, no_edge, quick_status, store
-from .fan import FAN_ROWS, fan_guesses
-from .flight import LEFT, advance, hangar, rest, stayed_inside, widen
-from .flow import contains
+from .edges import (
+    BLOCKED,
+    CLEARANCE_SPACING,
+    CONNECTED,
+    COST,
+    EDGE_COLUMNS,
+    NO_HIT,
+    STATUS,
+    Edge,
+    no_edge,
+    quick_status,
+    store,
+)
+from .fan import FAN_ROWS, Launch, Sweep, fan_guesses, outward_of
+from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, widen
+from .flow import Array, Numbers, contains
 from .motion import LANES, is_clear, stays_inside
-from .patch import ANGLE, GUESS_COLUMNS, HEADING, INVERSE, NODE, OUTSIDE, TASK, bin_range
-from .steer import HIT, OPEN, STATE, STEER_ROWS, TIME, aim, correct
+from .patch import (
+    GUESS_ANGLE,
+    GUESS_COLUMNS,
+    GUESS_HEADING,
+    GUESS_INVERSE,
+    GUESS_NODE,
+    GUESS_OUTSIDE,
+    GUESS_TASK,
+    Guesses,
+    Nodes,
+    bin_range,
+)
+from .place import Pair, Place
+from .steer import AIM_INVERSE, AIM_MISS, AIM_ROWS, AIM_STATE, AIM_TIME, HIT, OPEN, aim, control_in, correct
 
 MAX_TRIES = 12
 """Guesses that are polished for one node."""
@@ -28,10 +53,50 @@ SURE = 2.0
 """A flight is given up that is late even if its next step changes its time SURE times as much as the last."""
 INSIDE = 1e-9
 """A guess this little outside its triangle is inside."""
-ORIGIN, DIRECTION, DEADLINE, DONE = range(4)
+TASK_ORIGIN, TASK_DIRECTION, TASK_DEADLINE, TASK_DONE = range(4)
 """Columns of a task: the point it is for, its direction, by when its legs arrive [s], whether it is done."""
-ROW = 9
-"""A row of what is polished: the task, the node, the fields of Edge. What is found lacks the task."""
+TASK_COLUMNS = 4
+FOUND_TASK, FOUND_NODE, FOUND_EDGE = range(3)
+"""Columns of what is found for a task and a node: from FOUND_EDGE on the fields of Edge."""
+FOUND_COLUMNS = FOUND_EDGE + EDGE_COLUMNS
+LEG_NODE, LEG_EDGE = range(2)
+"""Columns of a leg that is handed over: what is found, without the task."""
+LEG_COLUMNS = LEG_EDGE + EDGE_COLUMNS
+
+
+class Points(NamedTuple):
+    """Points that legs set off from, or with `backward` arrive at, and the nodes that each asks for.
+
+    `position` (n, 3) [m], left at `departure` (n,) [s]; of point n `target[indptr[n]:indptr[n + 1]]`, or all
+    nodes where `indptr` is empty.
+    """
+
+    position: Array
+    departure: Array
+    backward: bool
+    indptr: Numbers
+    target: Numbers
+
+
+class Legs(NamedTuple):
+    """Room for what is found: `rows` (points, capacity, LEG_COLUMNS), `counts` (points,) how many of each.
+
+    A count above the capacity says how much is needed.
+    """
+
+    counts: Numbers
+    rows: Array
+
+
+class Turns(NamedTuple):
+    """The order in which guesses are tried: those of a task and a node are order[begin[g]:begin[g + 1]].
+
+    `time` (guesses,) [s]: how long each one's leg takes.
+    """
+
+    order: Numbers
+    begin: Numbers
+    time: Array
 
 
 @making
@@ -41,123 +106,183 @@ def ranks(keys):
 
 
 @kernel
+def place_of(points, n):
+    """Point n, and when legs leave it."""
+    x, y, z = points.position[n]
+    return Place(x, y, z, points.departure[n])
+
+
+@kernel
 def checked_leg(medium, lanes, n):
     """The leg that lane n has found, if it stays where the flow is known and where the terrain allows."""
     flow, dt = medium.flow, medium.integration.dt
-    direction = int(lanes[steer.DIRECTION, n])
-    c = control_towards(medium.polar, direction, lanes[steer.ANGLE, n], lanes[steer.HEADING, n])
-    x, y, z = lanes[steer.START_X, n], lanes[steer.START_Y, n], lanes[steer.START_Z, n]
-    t, time = lanes[steer.START_T, n], lanes[TIME, n]
-    if not (contains(flow, x, y, t) and contains(flow, lanes[steer.GOAL_X, n], lanes[steer.GOAL_Y, n], t)):
+    c, time = control_in(medium.polar, lanes, n), lanes[AIM_TIME, n]
+    start, goal = ends_of(lanes, n)
+    if not (contains(flow, start.x, start.y, start.t) and contains(flow, goal.x, goal.y, start.t)):
         return no_edge(NO_HIT)
-    if not (stayed_inside(flow, lanes, n, t, time) or stays_inside(flow, x, y, z, t, c.u, c.v, c.w, time, dt)):
+    if not (stayed_inside(flow, lanes, n, start.t, time) or stays_inside(flow, start, c, time, dt)):
         return no_edge(NO_HIT)
-    if not is_clear(flow, medium.terrain, x, y, z, t, c.u, c.v, c.w, time, dt, CLEARANCE_SPACING):
+    if not is_clear(flow, medium.terrain, start, c, time, dt, CLEARANCE_SPACING):
         return no_edge(BLOCKED)
     return Edge(
-        CONNECTED, time, edge_cost(medium.cost, time), c.glide_angle, c.heading, c.speed, lanes[steer.MISS, n]
+        CONNECTED, time, edge_cost(medium.cost, time), c.glide_angle, c.heading, c.speed, lanes[AIM_MISS, n]
     )
 
 
-@making
-def polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes):
-    """The cheapest exact leg between each task's point and each node among first guesses: rows (pairs, ROW).
+@kernel
+def _ranked(polar, position, points, tasks, guess):
+    """How long a guess's leg takes [s], and its rank among those of its task and node; inf where it is too late.
 
-    Of a node's guesses those inside a cell go first, earliest first, then those outside, nearest first. A lane
-    whose guess is settled takes the next one, so that all are always busy; none knows of the others.
+    Those inside a cell go first, earliest first, then those outside, nearest first.
     """
-    nodes = position.shape[0]
-    key = np.empty(count)
-    time = np.empty(count)
+    task = tasks[int(guess[GUESS_TASK])]
+    deadline = task[TASK_DEADLINE]
+    rise = abs(position[int(guess[GUESS_NODE]), 2] - points.position[int(task[TASK_ORIGIN]), 2])
+    time = rise / vertical_speed(polar, int(task[TASK_DIRECTION]), guess[GUESS_ANGLE])
+    outside = guess[GUESS_OUTSIDE]
+    if time > LATEST * deadline:
+        return time, math.inf
+    if outside <= INSIDE:
+        return time, time / (4.0 * deadline)
+    return time, 0.5 + 0.5 * min(outside, 0.9)
+
+
+@kernel
+def _sort_few(order, rank):
+    """Sort a few guesses by their rank, those of equal rank as they are."""
+    for n in range(1, order.size):
+        one = order[n]
+        m = n
+        while m > 0 and rank[order[m - 1]] > rank[one]:
+            order[m] = order[m - 1]
+            m -= 1
+        order[m] = one
+
+
+@making
+def in_turn(polar, position, points, tasks, guesses):
+    """The order in which guesses are tried: by task and node, and among those by rank; the late ones left out."""
+    rows, count = guesses
+    time, rank, pair = np.empty(count), np.empty(count), np.empty(count)
     late = 0
     for n in range(count):
-        task = tasks[int(guesses[n, TASK])]
-        rise = abs(position[int(guesses[n, NODE]), 2] - origin[int(task[ORIGIN]), 2])
-        time[n] = rise / vertical_speed(medium.polar, int(task[DIRECTION]), guesses[n, ANGLE])
-        outside = guesses[n, OUTSIDE]
-        rank = time[n] / (4.0 * task[DEADLINE]) if outside <= INSIDE else 0.5 + 0.5 * min(outside, 0.9)
-        key[n] = guesses[n, TASK] * nodes + guesses[n, NODE] + min(rank, 0.99)
-        if time[n] > LATEST * task[DEADLINE]:
-            key[n] = math.inf
+        time[n], rank[n] = _ranked(polar, position, points, tasks, rows[n])
+        pair[n] = rows[n, GUESS_TASK] * position.shape[0] + rows[n, GUESS_NODE]
+        if rank[n] == math.inf:
+            pair[n] = math.inf
             late += 1
-    order = ranks(key)
+    order = ranks(pair)
     count -= late
     begin = np.empty(count + 1, np.int64)
-    groups = 0
+    pairs = 0
     for n in range(count):
-        if n == 0 or math.floor(key[order[n]]) != math.floor(key[order[n - 1]]):
-            begin[groups] = n
-            groups += 1
-    begin[groups] = count
-    result = np.empty((groups, ROW))
-    for g in range(groups):
-        first = guesses[order[begin[g]]]
-        result[g, 0], result[g, 1] = first[TASK], first[NODE]
-        store(result[g, 2:], no_edge(NO_HIT))
+        if n == 0 or pair[order[n]] != pair[order[n - 1]]:
+            begin[pairs] = n
+            pairs += 1
+    begin[pairs] = count
+    for g in range(pairs):
+        _sort_few(order[begin[g] : begin[g + 1]], rank)
+    return Turns(order, begin[: pairs + 1], time)
+
+
+@kernel
+def _aim_at(medium, position, points, tasks, guess, lanes, n):
+    """Aim lane n by a first guess."""
+    task = tasks[int(guess[GUESS_TASK])]
+    start = place_of(points, int(task[TASK_ORIGIN]))
+    x, y, z = position[int(guess[GUESS_NODE])]
+    goal = Place(x, y, z, start.t)
+    pair = Pair(goal, start) if points.backward else Pair(start, goal)
+    sign = -1.0 if points.backward else 1.0
+    for m in range(4):
+        lanes[AIM_INVERSE + m, n] = sign * guess[GUESS_INVERSE + m]
+    control = guess[GUESS_ANGLE], guess[GUESS_HEADING]
+    aim(medium.polar, lanes, n, int(task[TASK_DIRECTION]), pair, *control, medium.integration.dt)
+
+
+@kernel
+def _correct(medium, lanes, n, deadline):
+    """Lane n has landed: correct its control, so that it flies again; False where its guess is settled."""
+    before = lanes[AIM_TIME, n]
+    correct(medium.polar, medium.integration, lanes, n)
+    time = lanes[AIM_TIME, n]
+    return lanes[AIM_STATE, n] == OPEN and time - SURE * abs(time - before) <= deadline
+
+
+@kernel
+def _keep_cheaper(medium, lanes, n, deadline, edge):
+    """Let what lane n has found be the edge, where it arrives in time, is cheaper and passes the checks."""
+    known, time = edge[STATUS] == CONNECTED, lanes[AIM_TIME, n]
+    if lanes[AIM_STATE, n] != HIT or time > deadline or (known and edge_cost(medium.cost, time) >= edge[COST]):
+        return
+    leg = checked_leg(medium, lanes, n)
+    if leg.status == CONNECTED or (leg.status == BLOCKED and not known):
+        store(edge, leg)
+
+
+@kernel
+def _is_worth_trying(cost, turns, g, at, rows, edge):
+    """Whether the guess at a place of the order may still better the edge of pair g."""
+    if at >= turns.begin[g + 1] or at - turns.begin[g] >= MAX_TRIES:
+        return False
+    guess = turns.order[at]
+    if edge[STATUS] != CONNECTED:
+        return True
+    return rows[guess, GUESS_OUTSIDE] <= INSIDE and edge_cost(cost, turns.time[guess]) < edge[COST]
+
+
+@making
+def nothing_found(turns, rows):
+    """Of each pair that has guesses a row of what is found: nothing so far."""
+    found = np.empty((turns.begin.size - 1, FOUND_COLUMNS))
+    for g in range(found.shape[0]):
+        first = rows[turns.order[turns.begin[g]]]
+        found[g, FOUND_TASK], found[g, FOUND_NODE] = first[GUESS_TASK], first[GUESS_NODE]
+        store(found[g, FOUND_EDGE:], no_edge(NO_HIT))
+    return found
+
+
+@making
+def polish(medium, position, points, tasks, guesses, lanes):
+    """The cheapest exact leg between each task's point and each node among first guesses: rows of what is found.
+
+    By task and node. A lane whose guess is settled takes the next one, so that all are always busy; none knows
+    of the others.
+    """
+    turns = in_turn(medium.polar, position, points, tasks, guesses)
+    rows = guesses.rows
+    found = nothing_found(turns, rows)
     # in the order of the nodes: lanes side by side fly through the same water
-    following = begin[:groups].copy()
+    following = turns.begin[:-1].copy()
     group = np.zeros(LANES, np.int64)
-    taken = 0
-    flying = 0
-    lanes[LEFT] = math.inf
-    for n in range(LANES):
-        if taken < groups:
-            group[n] = taken
-            _take(medium, position, origin, departure, backward, tasks, guesses[order[begin[taken]]], lanes, n)
-            taken += 1
-            flying += 1
+    lanes[LANE_LEFT] = math.inf
+    taken = min(LANES, found.shape[0])
+    for n in range(taken):
+        group[n] = n
+        _aim_at(medium, position, points, tasks, rows[turns.order[following[n]]], lanes, n)
+    flying = taken
     while flying > 0:
         advance(medium.flow, lanes)
         widen(lanes)
         for n in range(LANES):
-            if lanes[LEFT, n] > 0.0:
+            if lanes[LANE_LEFT, n] > 0.0:
                 continue
-            before = lanes[TIME, n]
-            correct(medium.polar, lanes, n, medium.integration.dt)
             g = group[n]
-            row = result[g, 2:]
-            known = row[0] == CONNECTED
-            deadline = tasks[int(result[g, 0]), DEADLINE]
-            if lanes[STATE, n] == OPEN and lanes[TIME, n] - SURE * abs(lanes[TIME, n] - before) <= deadline:
+            deadline = tasks[int(found[g, FOUND_TASK]), TASK_DEADLINE]
+            if _correct(medium, lanes, n, deadline):
                 continue
-            arrives = lanes[STATE, n] == HIT and lanes[TIME, n] <= deadline
-            if arrives and not (known and edge_cost(medium.cost, lanes[TIME, n]) >= row[2]):
-                edge = checked_leg(medium, lanes, n)
-                if edge.status == CONNECTED or (edge.status == BLOCKED and not known):
-                    store(row, edge)
-                    known = edge.status == CONNECTED
+            edge = found[g, FOUND_EDGE:]
+            _keep_cheaper(medium, lanes, n, deadline, edge)
             following[g] += 1
-            more = following[g] < begin[g + 1] and following[g] - begin[g] < MAX_TRIES
-            if more and known:
-                guess = order[following[g]]
-                more = guesses[guess, OUTSIDE] <= INSIDE and edge_cost(medium.cost, time[guess]) < row[2]
-            if not more:
-                if taken == groups:
+            if not _is_worth_trying(medium.cost, turns, g, following[g], rows, edge):
+                if taken == found.shape[0]:
                     rest(lanes, n)
                     flying -= 1
                     continue
-                g = taken
-                group[n] = g
+                g = group[n] = taken
                 taken += 1
-            _take(medium, position, origin, departure, backward, tasks, guesses[order[following[g]]], lanes, n)
-    return result
-
-
-@kernel
-def _take(medium, position, origin, departure, backward, tasks, guess, lanes, n):
-    """Aim lane n by a first guess."""
-    task = tasks[int(guess[TASK])]
-    x, y, z = origin[int(task[ORIGIN])]
-    x_q, y_q, z_q = position[int(guess[NODE])]
-    sign = 1.0
-    if backward:
-        x, y, z, x_q, y_q, z_q = x_q, y_q, z_q, x, y, z
-        sign = -1.0
-    for m in range(4):
-        lanes[steer.INVERSE + m, n] = sign * guess[INVERSE + m]
-    t, dt = departure[int(task[ORIGIN])], medium.integration.dt
-    control = guess[ANGLE], guess[HEADING]
-    aim(medium.polar, lanes, n, task[DIRECTION], x, y, z, t, x_q, y_q, z_q, *control, dt)
+            _aim_at(medium, position, points, tasks, rows[turns.order[following[g]]], lanes, n)
+    return found
 
 
 @kernel
@@ -177,34 +302,36 @@ def nodes_near(bins, layer, x, y, radius):
 
 
 @kernel
-def nodes_swept(bins, polar, direction, x, y, z, outward, deadline):
+def nodes_swept(bins, polar, launch, backward, deadline):
     """How many nodes a fan may pass over before the deadline [s].
 
     In still water a fan sweeps, at a height, the ring between its shallowest and its steepest glide; a current
     without divergence moves and bends it.
     """
+    origin, direction = launch.origin, launch.direction
+    upward = 2.0 * outward_of(direction, backward) - 1.0
     steep = polar.steepest[direction]
     across = horizontal_speed(polar, direction, steep) / vertical_speed(polar, direction, steep)
     swept = 0.0
     for layer in range(bins.levels.size):
-        rise = (bins.levels[layer] - z) * (2.0 * outward - 1.0)
+        rise = (bins.levels[layer] - origin.z) * upward
         angle = angle_of_vertical_speed(polar, direction, rise / deadline)
         if rise <= 0.0 or math.isnan(angle):
             continue
         slow = vertical_speed(polar, direction, angle)
         outer, inner = rise * horizontal_speed(polar, direction, angle) / slow, rise * across
         ring = 0.25 * math.pi * (1.0 - (inner / outer) ** 2)
-        swept += ring * nodes_near(bins, layer, x, y, outer)
+        swept += ring * nodes_near(bins, layer, origin.x, origin.y, outer)
     return swept
 
 
 @kernel
-def time_to_sweep(bins, polar, direction, x, y, z, outward, nodes, horizon):
+def time_to_sweep(bins, polar, launch, backward, nodes, horizon):
     """The time [s] in which a fan may pass over so many nodes, within the horizon [s]."""
     early, late = 0.0, horizon
     for _ in range(8):
         middle = 0.5 * (early + late)
-        if nodes_swept(bins, polar, direction, x, y, z, outward, middle) < nodes:
+        if nodes_swept(bins, polar, launch, backward, middle) < nodes:
             early = middle
         else:
             late = middle
@@ -212,10 +339,10 @@ def time_to_sweep(bins, polar, direction, x, y, z, outward, nodes, horizon):
 
 
 @kernel
-def later_deadline(bins, polar, direction, x, y, z, outward, deadline, arrived, limit, horizon):
+def later_deadline(bins, polar, launch, backward, deadline, arrived, limit, horizon):
     """A deadline [s] that should suffice for `limit` nodes, where `arrived` of them have met an earlier one."""
-    share = max(arrived, 1) / max(nodes_swept(bins, polar, direction, x, y, z, outward, deadline), 1.0)
-    enough = time_to_sweep(bins, polar, direction, x, y, z, outward, SPARE * limit / share, horizon)
+    share = max(arrived, 1) / max(nodes_swept(bins, polar, launch, backward, deadline), 1.0)
+    enough = time_to_sweep(bins, polar, launch, backward, SPARE * limit / share, horizon)
     return min(max(enough, LONGER * deadline), horizon)
 
 
@@ -223,133 +350,169 @@ def later_deadline(bins, polar, direction, x, y, z, outward, deadline, arrived, 
 def end_of(rows, task, begin):
     """Where the rows of a task end that begin at `begin`."""
     end = begin
-    while end < rows.shape[0] and rows[end, 0] == task:
+    while end < rows.shape[0] and rows[end, FOUND_TASK] == task:
         end += 1
     return end
 
 
-@entry_point(nogil=True)
-def reach_points(
-    medium, steering, bins, position, origin, departure, backward, indptr, target, limit, counts, found, first,
-    last,
-):  # fmt: skip
-    """The cheapest exact legs from the points origin[first:last] [m], left at `departure` [s], to nodes.
+@kernel
+def horizon_of(medium):
+    """The longest time [s] that a leg may take."""
+    return medium.integration.dt * medium.integration.steps
 
-    To the nodes `target[indptr[n]:indptr[n + 1]]`, or to all where `indptr` is empty; with `backward` from
-    them. With a `limit`, a fan is cut at a deadline, which is put off until that many of its legs arrive before
-    it; the fastest so many are kept of each direction. Into rows of `found` (n, capacity, node and fields of
-    Edge), by rising node; a count above the capacity says how much is needed.
-    """
-    horizon = medium.integration.dt * medium.integration.steps
-    lanes = hangar(max(STEER_ROWS, FAN_ROWS))
-    wanted = np.zeros(position.shape[0] if indptr.size > 0 else 0, np.bool_)
-    tasks = np.zeros((2 * (last - first), 4))
-    for task in range(tasks.shape[0]):
-        n, direction = first + task // 2, task % 2
-        counts[n] = 0
-        tasks[task, ORIGIN], tasks[task, DIRECTION], tasks[task, DEADLINE] = n, direction, horizon
-        if not contains(medium.flow, origin[n, 0], origin[n, 1], departure[n]):
-            tasks[task, DONE] = 1.0
-        elif limit > 0:
-            outward = 1 - direction if backward else direction
-            x, y, z = origin[n]
-            tasks[task, DEADLINE] = time_to_sweep(
-                bins, medium.polar, direction, x, y, z, outward, SPARE * limit, horizon
-            )
-    guesses = np.empty((1024, GUESS_COLUMNS))
-    settled = np.empty((0, ROW))
-    while True:
-        count = np.int64(0)  # not a literal: what takes it is compiled once
-        begin = 0
-        for task in range(tasks.shape[0]):
-            if tasks[task, DONE]:
-                continue
-            end = end_of(settled, task, begin)
-            n, direction = int(tasks[task, ORIGIN]), int(tasks[task, DIRECTION])
-            x, y, z = origin[n]
-            lowest, highest = -math.inf, math.inf
-            if indptr.size > 0:
-                lowest, highest = z, z
-                for k in range(indptr[n], indptr[n + 1]):
-                    wanted[target[k]] = True
-                    lowest, highest = min(lowest, position[target[k], 2]), max(highest, position[target[k], 2])
-            for k in range(begin, end):
-                wanted[int(settled[k, 1])] = False
-            deepest = highest if (direction == CLIMB) != backward else lowest
-            guesses, count = fan_guesses(
-                medium, steering, bins, position, wanted, task, direction, backward, x, y, z, departure[n],
-                deepest, tasks[task, DEADLINE], medium.integration.dt * FAN_STEP, guesses, count, lanes,
-            )  # fmt: skip
-            if indptr.size > 0:
-                for k in range(indptr[n], indptr[n + 1]):
-                    wanted[target[k]] = False
-            for k in range(begin, end):
-                wanted[int(settled[k, 1])] = True
-            begin = end
-        rows = np.concatenate(
-            (settled, polish(medium, position, origin, departure, backward, tasks, guesses, count, lanes))
-        )
-        rows = rows[ranks(rows[:, 0].copy())]
-        is_settled = np.zeros(rows.shape[0], np.bool_)
-        begin = 0
-        for task in range(tasks.shape[0]):
-            end = end_of(rows, task, begin)
-            if not tasks[task, DONE]:
-                arrived = np.count_nonzero(rows[begin:end, 2] == CONNECTED)
-                if arrived >= limit or tasks[task, DEADLINE] >= horizon:
-                    _keep(rows[begin:end], limit, counts, found, int(tasks[task, ORIGIN]))
-                    tasks[task, DONE] = 1.0
-                else:
-                    n, direction = int(tasks[task, ORIGIN]), int(tasks[task, DIRECTION])
-                    outward = 1 - direction if backward else direction
-                    x, y, z = origin[n]
-                    tasks[task, DEADLINE] = later_deadline(
-                        bins, medium.polar, direction, x, y, z, outward, tasks[task, DEADLINE], arrived, limit,
-                        horizon,
-                    )  # fmt: skip
-                    is_settled[begin:end] = rows[begin:end, 2] == CONNECTED
-            begin = end
-        if np.all(tasks[:, DONE] == 1.0):
-            break
-        settled = rows[is_settled]
-        if indptr.size == 0:
-            wanted = np.ones(position.shape[0], np.bool_)
-    for n in range(first, last):
-        legs = found[n, : min(counts[n], found.shape[1])]
-        legs[:] = legs[ranks(legs[:, 0].copy())]
+
+@kernel
+def launch_of(medium, points, task):
+    """The fan of a task, its steps those of a fan."""
+    origin = place_of(points, int(task[TASK_ORIGIN]))
+    return Launch(origin, int(task[TASK_DIRECTION]), medium.integration.dt * FAN_STEP)
 
 
 @making
-def _keep(rows, limit, counts, found, n):
-    """The rows of one task, the cheapest `limit` of them if there is one, into found[n]."""
+def first_tasks(medium, bins, points, limit, first, last):
+    """A dive and a climb for each of the points first..last - 1, with their first deadlines."""
+    horizon = horizon_of(medium)
+    tasks = np.zeros((2 * (last - first), TASK_COLUMNS))
+    for n in range(tasks.shape[0]):
+        task = tasks[n]
+        task[TASK_ORIGIN], task[TASK_DIRECTION], task[TASK_DEADLINE] = first + n // 2, n % 2, horizon
+        launch = launch_of(medium, points, task)
+        if not contains(medium.flow, launch.origin.x, launch.origin.y, launch.origin.t):
+            task[TASK_DONE] = 1.0
+        elif limit > 0:
+            nodes = SPARE * limit
+            task[TASK_DEADLINE] = time_to_sweep(bins, medium.polar, launch, points.backward, nodes, horizon)
+    return tasks
+
+
+@kernel
+def deepest_asked(nodes, points, n, upward):
+    """The height [m] of the highest node, or the lowest, that a point asks for; inf where it asks for all."""
+    if points.indptr.size == 0:
+        return math.inf if upward else -math.inf
+    furthest = points.position[n, 2]
+    for k in range(points.indptr[n], points.indptr[n + 1]):
+        z = nodes.position[points.target[k], 2]
+        furthest = max(furthest, z) if upward else min(furthest, z)
+    return furthest
+
+
+@kernel
+def want(wanted, points, n, value):
+    """Let the nodes that point n asks for be wanted, or no more; nothing where it asks for all."""
+    if points.indptr.size > 0:
+        for k in range(points.indptr[n], points.indptr[n + 1]):
+            wanted[points.target[k]] = value
+
+
+@making
+def guesses_of_tasks(medium, steering, nodes, points, tasks, settled, lanes):
+    """First guesses for the tasks that are not done, but for the nodes that are settled."""
+    guesses = Guesses(np.empty((1024, GUESS_COLUMNS)), 0)
+    begin = 0
+    for n in range(tasks.shape[0]):
+        if tasks[n, TASK_DONE]:
+            continue
+        point, launch = int(tasks[n, TASK_ORIGIN]), launch_of(medium, points, tasks[n])
+        end = end_of(settled, n, begin)
+        want(nodes.wanted, points, point, True)
+        for k in range(begin, end):
+            nodes.wanted[int(settled[k, FOUND_NODE])] = False
+        upward = outward_of(launch.direction, points.backward) == CLIMB
+        deepest = deepest_asked(nodes, points, point, upward)
+        sweep = Sweep(launch, n, points.backward, deepest, tasks[n, TASK_DEADLINE])
+        guesses = fan_guesses(medium, steering, nodes, sweep, guesses, lanes)
+        want(nodes.wanted, points, point, False)
+        for k in range(begin, end):
+            nodes.wanted[int(settled[k, FOUND_NODE])] = True
+        begin = end
+    return guesses
+
+
+@kernel
+def settle_tasks(medium, bins, points, tasks, rows, limit, legs, is_settled):
+    """Hand over what is found for the tasks that have enough; put off the deadlines of the others.
+
+    `rows` by task; of the others `is_settled` (rows,) says what need not be found again.
+    """
+    horizon = horizon_of(medium)
+    begin = 0
+    for n in range(tasks.shape[0]):
+        end = end_of(rows, n, begin)
+        task, found = tasks[n], rows[begin:end]
+        if not task[TASK_DONE]:
+            arrived = 0
+            for k in range(end - begin):
+                arrived += found[k, FOUND_EDGE + STATUS] == CONNECTED
+            if arrived >= limit or task[TASK_DEADLINE] >= horizon:
+                keep_cheapest(found, limit, legs, int(task[TASK_ORIGIN]))
+                task[TASK_DONE] = 1.0
+            else:
+                task[TASK_DEADLINE] = later_deadline(
+                    bins, medium.polar, launch_of(medium, points, task), points.backward, task[TASK_DEADLINE],
+                    arrived, limit, horizon,
+                )  # fmt: skip
+                for k in range(begin, end):
+                    is_settled[k] = rows[k, FOUND_EDGE + STATUS] == CONNECTED
+        begin = end
+
+
+@making
+def keep_cheapest(found, limit, legs, n):
+    """What is found for one task, the cheapest `limit` if there is one, into the legs of point n."""
     # NaN, the cost of what is not connected, sorts last
-    kept = ranks(rows[:, 4].copy())
-    last = min(limit, rows.shape[0]) if limit > 0 else rows.shape[0]
+    kept = ranks(found[:, FOUND_EDGE + COST].copy())
+    last = min(limit, found.shape[0]) if limit > 0 else found.shape[0]
     for k in range(last):
-        if counts[n] < found.shape[1]:
-            found[n, counts[n]] = rows[kept[k], 1:]
-        counts[n] += 1
+        if legs.counts[n] < legs.rows.shape[1]:
+            legs.rows[n, legs.counts[n]] = found[kept[k], FOUND_NODE:]
+        legs.counts[n] += 1
 
 
 @entry_point(nogil=True)
-def quick_statuses(medium, position, departure, source, indptr, target, outcomes, first, last):
-    """`quick_status` of all pairs of source[first:last], NO_HIT where nothing forbids a leg: outcomes[:, 0]."""
+def reach_points(medium, steering, nodes, points, limit, legs, first, last):
+    """The cheapest exact legs between the points first..last - 1 and nodes, into `legs`, by rising node.
+
+    With a `limit`, a fan is cut at a deadline, which is put off until that many of its legs arrive before
+    it; the fastest so many are kept of each direction. `nodes.wanted` is made here.
+    """
+    lanes = hangar(max(AIM_ROWS, FAN_ROWS))
+    legs.counts[first:last] = 0
+    tasks = first_tasks(medium, nodes.bins, points, limit, first, last)
+    wanted = np.zeros(nodes.position.shape[0] if points.indptr.size > 0 else 0, np.bool_)
+    settled = np.empty((0, FOUND_COLUMNS))
+    while True:
+        sought = Nodes(nodes.position, nodes.bins, wanted)
+        guesses = guesses_of_tasks(medium, steering, sought, points, tasks, settled, lanes)
+        rows = np.concatenate((settled, polish(medium, nodes.position, points, tasks, guesses, lanes)))
+        rows = rows[ranks(rows[:, FOUND_TASK].copy())]
+        is_settled = np.zeros(rows.shape[0], np.bool_)
+        settle_tasks(medium, nodes.bins, points, tasks, rows, limit, legs, is_settled)
+        if np.all(tasks[:, TASK_DONE] == 1.0):
+            break
+        settled = rows[is_settled]
+        if points.indptr.size == 0:
+            wanted = np.ones(nodes.position.shape[0], np.bool_)
     for n in range(first, last):
-        x_p, y_p, z_p = position[source[n]]
-        for k in range(indptr[n], indptr[n + 1]):
-            x_q, y_q, z_q = position[target[k]]
-            direction = 1 if z_q > z_p else 0
-            t = departure[source[n]]
-            status = quick_status(medium, direction, x_p, y_p, z_p, x_q, y_q, z_q, t)
+        mine = legs.rows[n, : min(legs.counts[n], legs.rows.shape[1])]
+        mine[:] = mine[ranks(mine[:, LEG_NODE].copy())]
+
+
+@entry_point(nogil=True)
+def quick_statuses(medium, pairs, outcomes, first, last):
+    """`quick_status` of all pairs of source[first:last] into outcomes, NO_HIT where nothing forbids a leg."""
+    for n in range(first, last):
+        for k in range(pairs.indptr[n], pairs.indptr[n + 1]):
+            status = quick_status(medium, pair_at(pairs, n, k))
             store(outcomes[k], no_edge(NO_HIT if status == CONNECTED else status))
 
 
 @entry_point(nogil=True)
-def answer(indptr, target, found_indptr, found_target, found, outcomes, first, last):
+def answer(pairs, found_indptr, found_target, found, outcomes, first, last):
     """The legs that were found, rising by target within a row, as outcomes of the pairs that asked for them."""
     for n in range(first, last):
         have = found_target[found_indptr[n] : found_indptr[n + 1]]
-        for k in range(indptr[n], indptr[n + 1]):
-            at = np.searchsorted(have, target[k])
-            if outcomes[k, 0] == NO_HIT and at < have.size and have[at] == target[k]:
+        for k in range(pairs.indptr[n], pairs.indptr[n + 1]):
+            at = np.searchsorted(have, pairs.target[k])
+            if outcomes[k, STATUS] == NO_HIT and at < have.size and have[at] == pairs.target[k]:
                 outcomes[k] = found[found_indptr[n] + at]

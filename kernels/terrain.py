@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from .cache import BARE
+from .cache import in_kernels
 from .flow import Array, grid_index
 
 
@@ -54,9 +53,7 @@ def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
     return _ALLOWED[type(terrain)](terrain, x, y, z)
 
 
-@overload(allowed, jit_options=BARE)
-def _allowed_in_kernels(terrain, x, y, z):
-    return _ALLOWED.get(getattr(terrain, "instance_class", type(None)))
+in_kernels(allowed, _ALLOWED)
 
 
 def _open_between(terrain, z, z_end):
@@ -75,6 +72,4 @@ def open_between(terrain: Terrain, z: float, z_end: float) -> bool:
     return _OPEN_BETWEEN[type(terrain)](terrain, z, z_end)
 
 
-@overload(open_between, jit_options=BARE)
-def _open_between_in_kernels(terrain, z, z_end):
-    return _OPEN_BETWEEN.get(getattr(terrain, "instance_class", type(None)))
+in_kernels(open_between, _OPEN_BETWEEN)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from glider_stream.kernels.flow import OceanGrid
+from glider_stream.kernels.flow import Extent, OceanGrid
 from glider_stream.kernels.terrain import OpenWater
 from glider_stream.roadmap.evaluator import Evaluator
 from glider_stream.roadmap.steering import IntegrationSettings, StreamlineMethod
@@ -85,14 +85,12 @@ def ocean_of():
             index_map=corners,
             per_x=1 / 200.0,
             per_y=1 / 200.0,
-            x_lo=-200.0,
-            x_hi=200.0,
-            y_lo=-200.0,
-            y_hi=200.0,
-            t_lo=0.0,
-            t_hi=1000.0,
-            max_speed=float(np.hypot(values[..., 0], values[..., 1]).max()),
-            length_scale=50.0,
+            extent=Extent(
+                *(-200.0, 200.0, -200.0, 200.0),
+                *(0.0, 1000.0),
+                max_speed=float(np.hypot(values[..., 0], values[..., 1]).max()),
+                length_scale=50.0,
+            ),
         )
 
     return build

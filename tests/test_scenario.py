@@ -72,7 +72,7 @@ def test_the_papers_nodes():
     assert nodes[-2:].tolist() == [[-450, 450, 0], [450, -450, 0]]
     assert sorted(set(nodes[:, 2])) == [-300, -200, -100, 0]
     assert sorted(set(nodes[:-2, 0])) == [-450 + 900 / 16 * (n + 0.5) for n in range(16)]
-    assert 1.8 < problem.evaluator.flow.max_speed < 1.95
+    assert 1.8 < problem.evaluator.flow.extent.max_speed < 1.95
 
 
 def test_a_scenario_in_a_folder_of_the_same_name_as_a_shipped_one(tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ from ..base.arrays import Array
 from ..kernels.cache import entry_point
 from ..kernels.flow import contains, velocities
 from ..kernels.motion import rk4_step
+from ..kernels.place import Place, Velocity
 from ..roadmap.problem import Problem
 
 CELLS, DEPTHS, REACH = 48, 8, 3
@@ -39,7 +40,7 @@ def follow(flow, point, stops, speed, sink, floor, ceiling, t, dt, latest, near,
         if z <= floor or z >= ceiling:
             w = sink if z <= floor else -sink
         u, v = speed * (stops[n, 0] - x) / away, speed * (stops[n, 1] - y) / away
-        x, y = rk4_step(flow, x, y, z, t + now, u, v, w, dt)
+        x, y = rk4_step(flow, Place(x, y, z, t + now), Velocity(u, v, w), dt)
         z = min(max(z + w * dt, floor), ceiling)
         now += dt
     return math.inf

@@ -25,8 +25,10 @@ from ..base.settings import require
 from ..base.threads import in_parallel, threads
 from ..base.toml import to_toml
 from ..kernels.cache import KERNEL_DIGEST, entry_point
+from ..kernels.control import control_of
 from ..kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
-from ..kernels.motion import LANES, X, Y
+from ..kernels.motion import LANE_X, LANE_Y, LANES
+from ..kernels.place import Place
 from ..roadmap.builder import find_edges, node_positions, warm_up
 from ..roadmap.store import read_roadmap
 from ..scenario import read_scenario, scenario_from_text
@@ -162,14 +164,12 @@ def _fly(flow, start, end, first, last):  # type: ignore[no-untyped-def]
     lanes = hangar(FLIGHT_ROWS)
     for e in range(first, last):
         for n in range(LANES):
-            turn = 2.0 * math.pi * n / LANES
-            place(
-                lanes, n, start[e, 0], start[e, 1], -100.0, 0.0, 0.6 * math.cos(turn), 0.6 * math.sin(turn), -0.32
-            )
+            x, y = start[e]
+            place(lanes, n, Place(x, y, -100.0, 0.0), control_of(0.68, -0.49, 2.0 * math.pi * n / LANES))
             fly_for(lanes, n, 5.0 * STEPS, 5.0)
         for _ in range(STEPS):
             advance(flow, lanes)
-        end[e] = lanes[X].sum() + lanes[Y].sum()
+        end[e] = lanes[LANE_X].sum() + lanes[LANE_Y].sum()
 
 
 def integrator(runs: int, ceiling: str | Path | None) -> Iterator[Figure]:

@@ -6,25 +6,23 @@ import numpy as np
 from numba import njit
 
 from ..kernels.cache import entry_point
-from ..kernels.control import glide_speed
+from ..kernels.control import control_towards
 from ..kernels.flow import contains
 from ..kernels.motion import rk4_step
+from ..kernels.place import Place
 
 
 @njit
 def land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
     """Where and when a control, left at t [s], lands at a depth: x, y [m], duration [s]; if the flow is known."""
-    speed = glide_speed(polar, direction, angle)
-    u = speed * math.cos(angle) * math.cos(heading)
-    v = speed * math.cos(angle) * math.sin(heading)
-    w = (2.0 * direction - 1.0) * speed * math.sin(angle)
-    duration = (z_q - z) / w
+    c = control_towards(polar, direction, angle, heading)
+    duration = (z_q - z) / c.w
     known = True
     n = 0
     while n * dt < duration:
         known &= contains(flow, x, y, t + n * dt)
-        step = min(dt, duration - n * dt)
-        x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, step)
+        here = Place(x, y, z + n * dt * c.w, t + n * dt)
+        x, y = rk4_step(flow, here, c, min(dt, duration - n * dt))
         n += 1
     return x, y, duration, known
 
@@ -72,21 +70,18 @@ def scan(flow, polar, direction, position, source, target, t, angles, headings, 
     off = np.empty((target.size, angles, headings))
     for i in range(angles):
         angle = low + (high - low) * i / (angles - 1)
-        speed = glide_speed(polar, direction, angle)
-        w = (2.0 * direction - 1.0) * speed * math.sin(angle)
         for j in range(headings):
-            heading = 2 * math.pi * j / headings
-            u = speed * math.cos(angle) * math.cos(heading)
-            v = speed * math.cos(angle) * math.sin(heading)
+            c = control_towards(polar, direction, angle, 2 * math.pi * j / headings)
             x, y, z = position[source]
             n = 0
             for k in order:
                 x_q, y_q, z_q = position[target[k]]
-                duration = (z_q - z) / w
+                duration = (z_q - z) / c.w
                 while (n + 1) * dt <= duration:
-                    x, y = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, dt)
+                    x, y = rk4_step(flow, Place(x, y, z + n * dt * c.w, t + n * dt), c, dt)
                     n += 1
-                x_1, y_1 = rk4_step(flow, x, y, z + n * dt * w, t + n * dt, u, v, w, duration - n * dt)
+                here = Place(x, y, z + n * dt * c.w, t + n * dt)
+                x_1, y_1 = rk4_step(flow, here, c, duration - n * dt)
                 off[k, i, j] = math.hypot(x_1 - x_q, y_1 - y_q)
     return off
 

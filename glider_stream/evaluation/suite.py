@@ -13,7 +13,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.settings import require
 from ..base.threads import threads
-from ..kernels.edges import Status
+from ..kernels.edges import STATUS, Status
 from ..roadmap.builder import build_roadmap
 from ..roadmap.neighbours import Reachable
 from ..roadmap.nodes import SobolSampler
@@ -215,7 +215,7 @@ def _completeness(problem: Problem, position: Array, count: int) -> tuple[float,
     best = fastest_legs(evaluator.flow, evaluator.polar, *ends, *SCAN, dt, horizon).ravel()
     indptr = np.arange(source.size + 1) * target.size
     rows = evaluator.connect(position, problem.departure, source, indptr, np.tile(target, source.size))
-    found = rows[np.isfinite(best), 0] == Status.CONNECTED
+    found = rows[np.isfinite(best), STATUS] == Status.CONNECTED
     return (float(found.mean()) if found.size else 1.0), found.size
 
 

@@ -19,6 +19,7 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
 from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 from ..roadmap.shard import Shard
+from ..roadmap.step_error import with_steps_checked
 from ..roadmap.store import read_part, writing
 from .journal import Journal
 
@@ -120,6 +121,9 @@ def _run(
     progress: Callable[[Progress], None],
     batch_pairs: int,
 ) -> None:
+    made = with_steps_checked(
+        made, problem, position, lambda some: in_order(list(job.finder(problem, position, some, batch_pairs)))
+    )
     nodes = np.arange(*shard.nodes(len(position)))
     tally = Tally(len(nodes), used)
     old = _taken_over(job, nodes)

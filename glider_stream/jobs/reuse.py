@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Bools
 from ..base.settings import require
-from ..kernels.flow import Flow, Grid, OceanGrid
+from ..kernels.flow import Flow, Grid, OceanGrid, fields_of
 from ..kernels.terrain import Seabed
 from ..roadmap.builder import node_positions
 from ..roadmap.pairs import NeighbourLegs
@@ -74,14 +74,12 @@ class _Lattice:
         self.horizon = integration.dt * integration.steps
         self.glide = float(now.evaluator.polar.best_horizontal.max())
         self.flows: tuple[Flow, Flow] = before.evaluator.flow, now.evaluator.flow
-        self.fastest = max(flow.max_speed for flow in self.flows)
+        self.fastest = max(flow.extent.max_speed for flow in self.flows)
         low, high = position[:, :2].min(axis=0), position[:, :2].max(axis=0)
         reach = (self.glide + self.fastest) * self.horizon
         # beyond the flow itself no path goes on
-        box = (
-            np.array([self.flows[1].x_lo, self.flows[1].y_lo]),
-            np.array([self.flows[1].x_hi, self.flows[1].y_hi]),
-        )
+        known = self.flows[1].extent
+        box = np.array([known.x_lo, known.y_lo]), np.array([known.x_hi, known.y_hi])
         low, high = np.maximum(low - reach, box[0]), np.minimum(high + reach, box[1])
         self.step = float((high - low).max()) / SIDE
         self.count = np.maximum(np.ceil((high - low) / self.step).astype(np.int64), 1)
@@ -92,10 +90,11 @@ class _Lattice:
         found = np.zeros(tuple(self.count), dtype=bool)
         terrains = self.before.evaluator.terrain, self.now.evaluator.terrain
         for one, other in (self.flows, terrains):
-            alike = [name for name in one._fields if _same(getattr(one, name), getattr(other, name, None))]
-            if type(one) is type(other) and len(alike) == len(one._fields):
+            now = fields_of(other)
+            unlike = {name for name, value in fields_of(one).items() if not _same(value, now.get(name))}
+            if type(one) is type(other) and not unlike:
                 continue
-            if type(one) is not type(other) or not set(one._fields) - set(alike) <= VALUES:
+            if type(one) is not type(other) or not unlike <= VALUES:
                 return None
             if isinstance(other, (Grid, OceanGrid)) and isinstance(one, (Grid, OceanGrid)):
                 unlike = self._in_time(other, (one.values != other.values).any(axis=-1))
@@ -126,7 +125,8 @@ class _Lattice:
             return self._known[id(grid)]
         axes = (self.low[n] + self.step * np.arange(self.count[n] + 1) for n in range(2))
         x, y = np.meshgrid(*axes, indexing="ij")
-        at = np.stack([(x - grid.x_lo) * grid.per_x, (y - grid.y_lo) * grid.per_y])
+        corner = grid if isinstance(grid, Seabed) else grid.extent
+        at = np.stack([(x - corner.x_lo) * grid.per_x, (y - corner.y_lo) * grid.per_y])
         if not isinstance(grid, Grid):
             at = np.stack(
                 [map_coordinates(grid.index_map[..., n], at, order=1, mode="nearest") for n in range(2)]
@@ -149,7 +149,7 @@ class _Lattice:
         gap = distance_transform_edt(~changed)[at[:, 0], at[:, 1]] * self.step - 2 * self.step
         legs = self.now.legs(self.position)
         near, far = (
-            (self.glide + speed) * self.horizon for speed in sorted(flow.max_speed for flow in self.flows)
+            (self.glide + speed) * self.horizon for speed in sorted(flow.extent.max_speed for flow in self.flows)
         )
         if not isinstance(legs, NeighbourLegs):
             return np.asarray(safe & (gap > far) if straight else safe)
@@ -186,7 +186,7 @@ class _Lattice:
     def _speeds(self) -> Array:
         """The fastest current that is read in each cell, at any depth and time: at most its grid points' own."""
         flow = self.flows[1]
-        result = np.full(tuple(self.count), flow.max_speed)
+        result = np.full(tuple(self.count), flow.extent.max_speed)
         if not isinstance(flow, (Grid, OceanGrid)):
             return result
         speeds = np.hypot(*np.moveaxis(self._in_time(flow, flow.values), -1, 0))

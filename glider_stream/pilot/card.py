@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
 
+from ..base.clock import moment
 from ..kernels.flow import velocities
 from ..roadmap.problem import Problem
 from ..search.path import SURFACE, Leg, Path
@@ -56,11 +56,6 @@ class Card:
     under: tuple[float, ...]
     best: float
 
-    def _when(self, seconds: float) -> str:
-        if self.path.departs is None:
-            return f"{seconds:,.0f} s"
-        return (self.path.departs + timedelta(seconds=seconds)).strftime("%Y-%m-%d %H:%MZ")
-
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON."""
         return {
@@ -91,7 +86,7 @@ class Card:
         return (
             f"{name}  {row.duration / 3600:6.2f}  {row.over_ground:6.2f} m/s {daily(row.over_ground):6.1f} km/d  "
             f"{row.along:+7.2f}  {row.across:+7.2f}  {row.toward_goal:6.1f} km/d  "
-            f"{row.fastest:5.2f}{'*' if row.outrun else ' '} m/s  {self._when(row.arrives)}"
+            f"{row.fastest:5.2f}{'*' if row.outrun else ' '} m/s  {moment(self.path.departs, row.arrives)}"
         )
 
 

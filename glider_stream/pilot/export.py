@@ -7,25 +7,41 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import timedelta
-from functools import partial
 from pathlib import Path as File
 from typing import Any
 from xml.etree import ElementTree as Xml
+
+import numpy as np
 
 from ..base.output import check_output, replacing
 from ..base.settings import require
 from ..search.path import Leg, Path
 from ..water.frame import wrapped
-from .seaglider import targets
+from . import seaglider, slocum
+from .route_maps import FIRST, OUR_NAME, STOP
 from .slocum import list_number, mission_files
+from .slocum_files import MOST_WAYPOINTS
 from .windows import HOURS, Window, windows
 
 Texts = dict[str, str]
 
 
-def _json(path: Path, name: str) -> Texts:
+@dataclass(frozen=True)
+class Options:
+    """How routes are exported: hours a window lasts, waypoints a goto list holds, how near one is reached [m].
+
+    Where `arrival_radius` is None each vehicle has its own.
+    """
+
+    window_hours: float = HOURS
+    most_waypoints: int = MOST_WAYPOINTS
+    arrival_radius: float | None = None
+
+
+def _json(path: Path, name: str, options: Options) -> Texts:
     return {name: json.dumps(path.as_dict(), indent=1) + "\n"}
 
 
@@ -39,7 +55,12 @@ def _track(path: Path) -> list[list[float]]:
     places = [_place(path.lonlat[0], path.start[2])] if path.lonlat is not None else []
     for leg in path.legs:
         assert leg.track is not None
-        places += [_place(lonlat, row[3]) for lonlat, row in zip(leg.track[1:], leg.trajectory[1:], strict=True)]
+        assert leg.lonlat is not None
+        places += [
+            _place(lonlat, row[3]) for lonlat, row in zip(leg.track[1:-1], leg.trajectory[1:-1], strict=True)
+        ]
+        # a leg misses its end by its tolerance, and the next one begins there
+        places.append(_place(leg.lonlat[1], leg.end[2]))
     return places
 
 
@@ -48,6 +69,11 @@ def _when(path: Path, seconds: float) -> str | None:
     if path.departs is None:
         return None
     return (path.departs + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _clock(path: Path, seconds: float) -> str:
+    """The time of day where the plan knows it, else the hours since departure."""
+    return _when(path, seconds) or f"{seconds / 3600:.3f} h"
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
@@ -63,9 +89,9 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
             place = {"lat": lat, "lon": lon}
         arrives = leg.depart + leg.duration
         yield {
-            "name": f"WP{n:03}",
+            "name": STOP.format(n),
             **place,
-            "eta": _when(path, arrives) or round(arrives, 1),
+            "eta": _clock(path, arrives),
             "depth_min": round(float(depths.min()), 2) + 0.0,
             "depth_max": round(float(depths.max()), 2),
             "heading": round(leg.compass, 2),
@@ -85,7 +111,7 @@ def _mean_current(leg: Leg) -> tuple[float, float]:
     return float(u * c + v * s), float(v * c - u * s)
 
 
-def _csv(path: Path, name: str) -> Texts:
+def _csv(path: Path, name: str, options: Options) -> Texts:
     return _table(list(_rows(path)), name)
 
 
@@ -97,14 +123,22 @@ def _table(rows: list[dict[str, Any]], name: str) -> Texts:
     return {name: text.getvalue()}
 
 
-def _geojson(path: Path, name: str) -> Texts:
+def _geojson(path: Path, name: str, options: Options) -> Texts:
     line = {"type": "LineString", "coordinates": _track(path)}
     features = [{"type": "Feature", "geometry": line, "properties": {"travel_time_s": path.travel_time}}]
-    for row, leg in zip(_rows(path), path.legs, strict=True):
-        assert leg.lonlat is not None
-        point = {"type": "Point", "coordinates": _place(leg.lonlat[1], leg.end[2])}
+    for row, place in list(_stops(path))[1:]:
+        point = {"type": "Point", "coordinates": place}
         features.append({"type": "Feature", "geometry": point, "properties": row})
     return {name: json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"}
+
+
+def _stops(path: Path) -> Iterator[tuple[dict[str, Any], list[float]]]:
+    """The place where the route begins, and where each leg ends, with its row."""
+    assert path.lonlat is not None
+    yield {"name": FIRST, "eta": _clock(path, 0.0)}, _place(path.lonlat[0], path.start[2])
+    for row, leg in zip(_rows(path), path.legs, strict=True):
+        assert leg.lonlat is not None
+        yield row, _place(leg.lonlat[1], leg.end[2])
 
 
 def _child(parent: Xml.Element, tag: str, text: str | None = None, **attributes: str) -> Xml.Element:
@@ -118,16 +152,16 @@ def _xml(root: Xml.Element, name: str) -> Texts:
     return {name: '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"}
 
 
-def _kml(path: Path, name: str) -> Texts:
+def _kml(path: Path, name: str, options: Options) -> Texts:
     root = Xml.Element("kml", xmlns="http://www.opengis.net/kml/2.2")
     document = _child(root, "Document")
-    _child(document, "name", "glider-stream route")
+    _child(document, "name", OUR_NAME)
     route = _child(document, "Placemark")
     _child(route, "name", "route")
     line = _child(route, "LineString")
     _child(line, "altitudeMode", "absolute")
     _child(line, "coordinates", " ".join(",".join(map(str, place)) for place in _track(path)))
-    for row, leg in zip(_rows(path), path.legs, strict=True):
+    for row, place in list(_stops(path))[1:]:
         mark = _child(document, "Placemark")
         _child(mark, "name", row["name"])
         said = f"heading {row['heading']} degrees, glide angle {row['glide_angle']} degrees, eta {row['eta']}"
@@ -136,42 +170,46 @@ def _kml(path: Path, name: str) -> Texts:
             _child(_child(mark, "TimeStamp"), "when", row["eta"])
         point = _child(mark, "Point")
         _child(point, "altitudeMode", "absolute")
-        assert leg.lonlat is not None
-        _child(point, "coordinates", ",".join(map(str, _place(leg.lonlat[1], leg.end[2]))))
+        _child(point, "coordinates", ",".join(map(str, place)))
     return _xml(root, name)
 
 
-def _gpx(path: Path, name: str) -> Texts:
+def _gpx(path: Path, name: str, options: Options) -> Texts:
     root = Xml.Element("gpx", version="1.1", creator="glider-stream", xmlns="http://www.topografix.com/GPX/1/1")
     route = _child(root, "rte")
-    for row, leg in zip(_rows(path), path.legs, strict=True):
-        assert leg.lonlat is not None
-        lon, lat, z = _place(leg.lonlat[1], leg.end[2])
+    stops = list(_stops(path))
+    for row, (lon, lat, z) in stops:
         point = _child(route, "rtept", lat=str(lat), lon=str(lon))
         _child(point, "ele", str(z))
         if path.departs is not None:
             _child(point, "time", row["eta"])
         _child(point, "name", row["name"])
     segment = _child(_child(root, "trk"), "trkseg")
-    for lon, lat, z in _track(path):
-        _child(_child(segment, "trkpt", lat=str(lat), lon=str(lon)), "ele", str(z))
+    # the curve's points that are stops have their names, so that a track that is kept alone still is the route
+    ends = np.cumsum([0, *(len(leg.trajectory) - 1 for leg in path.legs)]).tolist()
+    names = {end: row["name"] for end, (row, _) in zip(ends, stops, strict=True)}
+    for n, (lon, lat, z) in enumerate(_track(path)):
+        point = _child(segment, "trkpt", lat=str(lat), lon=str(lon))
+        _child(point, "ele", str(z))
+        if n in names:
+            _child(point, "name", names[n])
     return _xml(root, name)
 
 
 def _said(path: Path, window: Window) -> dict[str, Any]:
     """When a window is, and how deep the vehicle is there."""
     return {
-        "from": _when(path, window.start) or round(window.start, 1),
-        "to": _when(path, window.end) or round(window.end, 1),
+        "from": _clock(path, window.start),
+        "to": _clock(path, window.end),
         "depth_min": round(window.shallowest, 2),
         "depth_max": round(window.deepest, 2),
     }
 
 
-def _windows_geojson(path: Path, name: str, hours: float) -> Texts:
+def _windows_geojson(path: Path, name: str, options: Options) -> Texts:
     """A polygon for each window; at the date line it is cut in two, as RFC 7946 asks (3.1.9)."""
     features = []
-    for window in windows(path, hours):
+    for window in windows(path, options.window_hours):
         rings = [[[[w, s], [e, s], [e, n], [w, n], [w, s]]] for w, s, e, n in window.outline()]
         shape: dict[str, Any] = {"type": "Polygon", "coordinates": rings[0]}
         if len(rings) > 1:
@@ -180,27 +218,37 @@ def _windows_geojson(path: Path, name: str, hours: float) -> Texts:
     return {name: json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"}
 
 
-def _windows_csv(path: Path, name: str, hours: float) -> Texts:
+def _windows_csv(path: Path, name: str, options: Options) -> Texts:
     """A row for each window; west of it is above east where it crosses the date line."""
     sides = ("x_min", "y_min", "x_max", "y_max") if path.lonlat is None else ("west", "south", "east", "north")
     rows = []
-    for window in windows(path, hours):
+    for window in windows(path, options.window_hours):
         boxes = window.outline()
         box = [round(bound, 6) for bound in (*boxes[0][:2], *boxes[-1][2:])]
         rows.append({**dict(zip(sides, box, strict=True)), **_said(path, window)})
     return _table(rows, name)
 
 
-EXPORTS: dict[str, Callable[[Path, str], Texts]] = {
+def _goto_lists(path: Path, name: str, options: Options) -> Texts:
+    radius = slocum.RADIUS if options.arrival_radius is None else options.arrival_radius
+    return mission_files(path, name, options.most_waypoints, radius)
+
+
+def _targets(path: Path, name: str, options: Options) -> Texts:
+    radius = seaglider.RADIUS if options.arrival_radius is None else options.arrival_radius
+    return seaglider.targets(path, name, radius)
+
+
+EXPORTS: dict[str, Callable[[Path, str, Options], Texts]] = {
     ".json": _json,
     ".geojson": _geojson,
     ".kml": _kml,
     ".gpx": _gpx,
     ".csv": _csv,
-    ".ma": mission_files,
-    "targets": targets,
-    ".windows.geojson": partial(_windows_geojson, hours=HOURS),
-    ".windows.csv": partial(_windows_csv, hours=HOURS),
+    ".ma": _goto_lists,
+    "targets": _targets,
+    ".windows.geojson": _windows_geojson,
+    ".windows.csv": _windows_csv,
 }
 """By a file's ending, or its name: what writes it; a form may need more than one file."""
 ANYWHERE = (".json", ".csv", ".windows.csv")
@@ -223,22 +271,38 @@ def check_export(file: str | File) -> None:
     check_output(file)
 
 
-def export_path(path: Path, file: str | File, window_hours: float = HOURS) -> list[File]:
+def check_legs(path: Path, files: Sequence[str | File]) -> None:
+    """InputError where a path leads from a place to itself, and one of the files would hold legs."""
+    for file in files:
+        empty = f"the route has no leg, its start is its goal, so there is nothing to write into {file}"
+        written = bool(path.legs) or not path.found or _form(file) == ".json"
+        require(written, f"{empty}; give another goal")
+
+
+def export_path(
+    path: Path, file: str | File, say: Callable[[str], None] = lambda note: None, **options: Any
+) -> list[File]:
     """Write a path in the form that the file's ending names; returns the files that it took.
 
-    Where there is no path only JSON says so; no file of another form is written. Windows last `window_hours`.
+    Where there is no path only JSON says so; no file of another form is written, and `say` hears of that, and of
+    what was removed. `options` as `Options` has them. InputError where the path has no leg to write.
     """
     check_export(file)
-    form, place = _form(file), File(file)
+    form, place, chosen = _form(file), File(file), Options(**options)
     geographic = path.lonlat is not None or form in ANYWHERE
     require(geographic, f"the route file {file} needs longitude and latitude; plan in a geographic scenario")
-    if not path.legs and form != ".json":
+    if not path.found and form != ".json":
+        older = "; the file of that name is of an earlier query" if place.exists() else ""
+        say(f"{file} is not written, since there is no path{older}")
         return []
-    write = EXPORTS[form]
-    texts = write(path, place.name, hours=window_hours) if isinstance(write, partial) else write(path, place.name)
+    check_legs(path, [file])
+    texts = EXPORTS[form](path, place.name, chosen)
     for name in texts:
         check_output(place.with_name(name))
     for name, text in texts.items():
         with replacing(place.with_name(name)) as temporary:
             temporary.write_text(text, encoding="utf-8")
+    if form == ".ma":
+        for note in slocum.clear_leftovers(place.parent, place.name, list(texts)):
+            say(note)
     return [place.with_name(name) for name in texts]

@@ -1,24 +1,33 @@
 """Routes that somebody drew, out of the files that maps write."""
 
 import csv
-import io
 import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 from ..base.errors import InputError
 from ..base.settings import require
+from .route_columns import NotARoute, csv_points, depth_of, number, told_height
+from .route_maps import OURS, Mark, gpx_points, kml_points, route_of
+from .seaglider import target_points
+from .slocum_files import goto_points
 
 Place = tuple[float, float, float]
 MOST_TEXT, MOST_POINTS = 20_000_000, 10_000
 BROKEN = ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError
 """What reading a text raises that is not what its ending says."""
-DEGREES = ("lon", "longitude"), ("lat", "latitude"), ("depth", "depth_m")
-METRES = ("x", "x_m"), ("y", "y_m"), ("z", "z_m")
+
+
+class Found(NamedTuple):
+    """What a file holds: its points, whether they are lon, lat, depth, and what the reader of it must know."""
+
+    points: list[Any]
+    geographic: bool
+    notes: list[str]
 
 
 @dataclass(frozen=True)
@@ -26,21 +35,25 @@ class Drawn:
     """The points of a drawn route, in order.
 
     Where it is `geographic`: lon, lat [degrees], depth [m], downward; else x, y, z [m] of the local frame.
+    `notes`: what the file leaves open, and what of it was not read.
     """
 
     places: tuple[Place, ...]
     geographic: bool
+    notes: tuple[str, ...] = ()
+    of_vehicle: bool = False
+    """Whether a vehicle flies it from wherever it is, so that the way to the first point is not told."""
 
 
 def read_drawn(file: str | Path) -> Drawn:
-    """A drawn route: CSV with a header, GeoJSON, KML, GPX or a path file of our own.
+    """A drawn route: CSV with a header, GeoJSON, KML, GPX, a path file, a goto list, a Seaglider's targets.
 
     A point without depth lies at the surface. Of our own exports: where the route begins, and where legs end.
-    InputError where there are fewer than two points, more than one line, or where the file is none of these.
+    InputError where there is no point, more than one line, a number that nobody knows, or another file.
     """
     path = Path(file)
     require(path.is_file(), f"the route {path} does not exist; name a file")
-    form = path.suffix.lower()
+    form = "targets" if path.name.lower() == "targets" else path.suffix.lower()
     known, got = ", ".join(FORMS), repr(form or "no ending")
     require(form in FORMS, f"the route {path} must end in one of: {known}; got {got}")
     try:
@@ -48,7 +61,9 @@ def read_drawn(file: str | Path) -> Drawn:
             content = stream.read(MOST_TEXT + 1)
         most = f"more than the {MOST_TEXT:,} bytes that a route needs"
         require(len(content) <= MOST_TEXT, f"the route {path} holds {most}; simplify it")
-        points, geographic = FORMS[form](content.decode("utf-8-sig"))
+        points, geographic, notes = FORMS[form](content.decode("utf-8-sig"))
+    except NotARoute as error:
+        raise InputError(f"{path.name} cannot be read as a route: {error}") from None
     except InputError:
         raise
     except OSError as error:
@@ -57,9 +72,12 @@ def read_drawn(file: str | Path) -> Drawn:
         said = " ".join(str(error).split())[:200] if isinstance(error, ValueError | csv.Error) else ""
         said = said or ("its XML is broken" if isinstance(error, Xml.ParseError) else "it is not built as one is")
         raise InputError(f"{path.name} cannot be read as a route: {said}; export it again") from None
-    count = f"from 2 to {MOST_POINTS:,} points; got {len(points)}"
-    require(2 <= len(points) <= MOST_POINTS, f"{path.name} must hold {count}")
-    return Drawn(tuple(_place(point, n, path.name) for n, point in enumerate(points, 1)), geographic)
+    # a vehicle's own list begins where the vehicle is
+    least = 1 if form in VEHICLES else 2
+    count = f"from {least} to {MOST_POINTS:,} points; got {len(points)}"
+    require(least <= len(points) <= MOST_POINTS, f"{path.name} must hold {count}")
+    places = tuple(_place(point, n, path.name) for n, point in enumerate(points, 1))
+    return Drawn(places, geographic, tuple(notes), form in VEHICLES)
 
 
 def _place(point: Any, number: int, name: str) -> Place:
@@ -72,112 +90,86 @@ def _place(point: Any, number: int, name: str) -> Place:
     return a, b, c
 
 
-def _csv(text: str) -> tuple[list[Any], bool]:
-    first = text.lstrip().partition("\n")[0]
-    rows = list(csv.DictReader(io.StringIO(text.lstrip()), delimiter=max(",;\t", key=first.count)))
-    header = {name.strip().lower(): name for name in (rows[0] if rows else {}) if name}
-    for kind in (DEGREES, METRES):
-        across, along, height = (next((header[name] for name in names if name in header), None) for names in kind)
-        if across is not None and along is not None:
-            # the depths of our own table are those of whole legs
-            if height is None and "depth_min" in header:
-                raise ValueError(
-                    "it says neither where the first leg begins nor how deep legs end, as a .json does"
-                )
-            return [(row[across], row[along], row[height] if height else 0.0) for row in rows], kind is DEGREES
-    raise ValueError(f"its columns are {', '.join(header) or 'none'}, and not lon, lat, depth or x, y, z")
+def _csv(text: str) -> Found:
+    return Found(*csv_points(text), [])
 
 
-def _json(text: str) -> tuple[list[Any], bool]:
+def _json(text: str) -> Found:
     table = json.loads(text)
     if isinstance(table.get("legs"), list):  # a path file of our own, in metres
         if not table["legs"]:
-            raise ValueError("it holds no leg")
-        return [table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False
-    lines: list[list[Any]] = []
-    points: list[Any] = []
+            raise NotARoute("it holds no leg; give the file of a path that was found")
+        return Found([table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False, [])
     features = table["features"] if table["type"] == "FeatureCollection" else [table]
+    lines: list[tuple[list[Any], dict[str, Any]]] = []
+    points: list[tuple[list[Any], dict[str, Any]]] = []
     ours = False
     for feature in features:
-        one = feature["geometry"] if feature["type"] == "Feature" else feature
-        ours = ours or "travel_time_s" in (feature.get("properties") or {})
-        if one is None:
+        whole = feature["type"] == "Feature"
+        geometry, properties = feature["geometry"] if whole else feature, (feature.get("properties") or {})
+        ours = ours or "travel_time_s" in properties
+        if geometry is None:
             continue
-        if one["type"] == "LineString":
-            lines.append([_below(place) for place in one["coordinates"]])
-        elif one["type"] == "Point":
-            points.append(_below(one["coordinates"]))
-        else:
-            raise ValueError(f"it holds a {one['type']}, and not a line or points")
-    return _one(lines, points, ours), True
+        if geometry["type"] not in ("LineString", "Point"):
+            raise NotARoute(f"it holds a {geometry['type']}, and not a line or points; draw a line")
+        (lines if geometry["type"] == "LineString" else points).append((geometry["coordinates"], properties))
+    for _, properties in lines:
+        _check_line(properties)
+    # what stands beside a line is a mark on the map, and places nothing but where it is ours
+    marks = [_mark(place, {"name": told.get("name", "")} if lines else told) for place, told in points]
+    return Found(route_of([[_below(place, {}) for place in line] for line, _ in lines], marks, ours), True, [])
 
 
-def _one(lines: list[list[Any]], points: list[Any], ours: bool) -> list[Any]:
-    """The route among lines and points: a line that is alone; points beside it are marks on a map."""
-    if len(lines) > 1:
-        raise ValueError(f"it holds {len(lines)} lines, and a route is one")
-    if ours and lines:
-        # our line is the curved track: the route is where it begins and where its legs end
-        return [lines[0][0], *points]
-    return lines[0] if lines else points
+def _mark(place: Any, properties: dict[str, Any]) -> Mark:
+    name = str(properties.get("name", ""))
+    return Mark(name, _below(place, {} if OURS.fullmatch(name) else properties))
 
 
-def _below(place: Any) -> tuple[Any, Any, float]:
-    """lon, lat and an altitude as lon, lat, depth."""
-    return place[0], place[1], 0.0 - place[2] if len(place) > 2 else 0.0
+def _check_line(properties: dict[str, Any]) -> None:
+    """NotARoute where a line's properties say how deep it lies: they would say it of all its points at once."""
+    for name, value in properties.items():
+        several = [number(one) for one in value] if isinstance(value, list) else [number(value)]
+        if any(one is not None for one in several):
+            if told_height({name: several[0] or 0.0}, "property") is None:
+                continue
+            refuse = "write depths as the third coordinate of each point, negative below the surface"
+            raise NotARoute(f"its line has a property {name!r}, one for all of its points; {refuse}")
 
 
-def _tree(text: str) -> Xml.Element:
-    # entities are declared in a document type, and only there
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError("it declares a document type, which is not read")
-    return Xml.fromstring(text)
+def _below(place: Any, properties: dict[str, Any]) -> tuple[Any, Any, float]:
+    """lon, lat and an altitude as lon, lat, depth, which properties may say, too."""
+    told = told_height(properties, "property")
+    return place[0], place[1], depth_of(place[2] if len(place) > 2 else None, told)
 
 
-def _named(tree: Xml.Element, name: str) -> list[Xml.Element]:
-    return [one for one in tree.iter() if one.tag.rsplit("}", 1)[-1] == name]
+def _kml(text: str) -> Found:
+    points, notes = kml_points(text)
+    return Found(points, True, notes)
 
 
-def _kml(text: str) -> tuple[list[Any], bool]:
-    tree = _tree(text)
-    lines, points = ([_coordinates(one) for one in _named(tree, kind)] for kind in ("LineString", "Point"))
-    ours = any(one.text == "glider-stream route" for one in _named(tree, "name"))
-    found = _one(lines, [place for point in points for place in point], ours)
-    if not found:
-        raise ValueError("it holds no line and no points")
-    return found, True
+def _gpx(text: str) -> Found:
+    return Found(gpx_points(text), True, [])
 
 
-def _coordinates(shape: Xml.Element) -> list[Any]:
-    texts = " ".join(one.text or "" for one in _named(shape, "coordinates"))
-    return [_below([float(value) for value in place.split(",")]) for place in texts.split()]
+def _goto(text: str) -> Found:
+    points, notes = goto_points(text)
+    return Found(points, True, notes)
 
 
-def _gpx(text: str) -> tuple[list[Any], bool]:
-    tree = _tree(text)
-    routes, tracks = ([_marks(one, f"{kind}pt") for one in _named(tree, kind)] for kind in ("rte", "trk"))
-    if tree.get("creator") == "glider-stream":
-        return _one(tracks, routes[0], True), True
-    found = _one(routes or tracks, _marks(tree, "wpt"), False)
-    if not found:
-        raise ValueError("it holds no route point, way point or track point")
-    return found, True
+def _targets(text: str) -> Found:
+    points, notes = target_points(text)
+    return Found(points, True, notes)
 
 
-def _marks(tree: Xml.Element, name: str) -> list[Any]:
-    """Points of GPX."""
-    places = []
-    for one in _named(tree, name):
-        heights = [float(height.text or 0.0) for height in _named(one, "ele")[:1]]
-        places.append(_below([float(one.attrib["lon"]), float(one.attrib["lat"]), *heights]))
-    return places
-
-
-FORMS: dict[str, Callable[[str], tuple[list[Any], bool]]] = {
+FORMS: dict[str, Callable[[str], Found]] = {
     ".csv": _csv,
     ".geojson": _json,
     ".json": _json,
     ".kml": _kml,
     ".gpx": _gpx,
+    ".ma": _goto,
+    "targets": _targets,
 }
-"""By a file's ending: what reads its points, and whether they are in degrees."""
+"""By a file's ending, or its name: what reads its points."""
+VEHICLES = (".ma", "targets")
+"""The forms that vehicles fly, from wherever they are."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from ..base.arrays import Array
+from ..base.clock import moment, span
 from ..kernels.edges import Edge, Status
 from ..search.path import Hop, Path, hops_of
 
@@ -39,11 +40,15 @@ class ScoredLeg:
 
 @dataclass(frozen=True)
 class Score:
-    """The legs up to the first that fails, of `asked`; `flown`, all their glides, where there are any."""
+    """The legs up to the first that fails, of `asked`; `flown`, all their glides, where there are any.
+
+    `notes`: what the route's file leaves open, and what of it was not read.
+    """
 
     legs: tuple[ScoredLeg, ...]
     asked: int
     flown: Path | None
+    notes: tuple[str, ...] = ()
 
     @property
     def flyable(self) -> bool:
@@ -71,24 +76,27 @@ class Score:
                 }
                 for leg in self.legs
             ],
+            "notes": list(self.notes),
         }
 
     def __str__(self) -> str:
+        departs = None if self.flown is None else self.flown.departs
         if self.flyable:
-            title = f"the route takes {self.time:,.0f} s"
+            arrives = "" if departs is None else f", arrives {moment(departs, self.time)}"
+            title = f"the route takes {span(self.time)}{arrives}"
         else:
             failed = self.legs[-1]
             name = failed.status.name.lower().replace("_", " ")
             title = f"leg {len(self.legs)} of {self.asked} fails: {failed.why} ({name})"
         glides = iter(() if self.flown is None else self.flown.legs)
-        lines = [title]
+        lines = [title, *(f"  note: {note}" for note in self.notes)]
         for n, leg in enumerate(self.legs, 1):
             said = "fails"
             if leg.time is not None:
-                said = f"{leg.time:,.0f} s, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
+                said = f"{span(leg.time)}, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
             if leg.status == Status.SAME_DEPTH and leg.glides:
                 said += " of the roadmap: one glide changes depth, and its ends lie at the same"
-            lines += [f"  leg {n}: {said}", *(f"    {next(glides)}" for _ in range(leg.glides))]
+            lines += [f"  leg {n}: {said}", *(f"    {next(glides).told(departs)}" for _ in range(leg.glides))]
         return "\n".join(lines)
 
 

@@ -1,22 +1,134 @@
-"""Seaglider's `targets` file: a route's waypoints, each naming the next."""
+"""Seaglider's `targets` file: waypoints, each naming the next; written, read, looked through for faults."""
+
+import math
+import re
+from typing import NamedTuple
 
 from ..base.settings import require
 from ..search.path import Path
 from ..water.frame import wrapped
-from .waypoints import degrees_and_minutes, waypoints
+from .route_columns import NotARoute
+from .waypoints import degrees_and_minutes, from_degrees_and_minutes, waypoints
 
-RADIUS = 200
-"""A target counts as reached this near [m]."""
+RADIUS = 200.0
+"""A target counts as reached this near [m], unless the pilot says otherwise."""
+MOST_TARGETS = 999
+NEEDED = ("lat", "lon", "radius", "goto")
+OPTIONAL = {"escape": None, "depth": (-2000.0, 2000.0), "finish": (-1.0, 360.0), "timeout": (0.0, 365.0)}
+"""What else a target may say, and between what: metres of a contour, degrees, days."""
 
 
-def targets(path: Path, name: str) -> dict[str, str]:
+def targets(path: Path, name: str, radius: float = RADIUS) -> dict[str, str]:
     """A route as a targets file; the last target is held."""
+    require(0 < radius < math.inf, f"a target must be reached within more than 0 m; got {radius:g}")
     places = waypoints(path)
-    require(len(places) <= 999, f"{len(places)} targets are more than 999; plan fewer surfacings")
+    most = f"{len(places)} targets are more than {MOST_TARGETS}; plan fewer surfacings"
+    require(len(places) <= MOST_TARGETS, most)
     names = [f"WP{n:03}" for n in range(1, len(places) + 1)]
     lines = [
         f"{here} lat={degrees_and_minutes(at.lat)} lon={degrees_and_minutes(float(wrapped(at.lon, 0.0)))} "
-        f"radius={RADIUS} goto={after}"
+        f"radius={radius:g} goto={after}"
         for here, after, at in zip(names, [*names[1:], names[-1]], places, strict=True)
     ]
     return {name: "\n".join(["/ a route of glider-stream", *lines]) + "\n"}
+
+
+class Target(NamedTuple):
+    """A line of a targets file: its number, the target's name, and what it says by key."""
+
+    line: int
+    name: str
+    said: dict[str, str]
+
+
+def read_targets(text: str) -> tuple[list[Target], list[str]]:
+    """The targets of a file, and what is wrong with its lines; comments begin with a slash."""
+    found, faults = [], list[str]()
+    for n, line in enumerate(text.splitlines(), 1):
+        if not line.isascii():
+            faults.append(f"line {n} has a character outside ASCII: {line.strip()!r}")
+        if line.startswith("/") or not line.strip():
+            continue
+        if line != line.strip():
+            faults.append(f"line {n} begins or ends with a blank")
+        # public files have blanks after an equals sign
+        name, *parts = re.sub(r"\s*=\s*", "=", line.strip()).split()
+        said = dict(part.split("=", 1) for part in parts if "=" in part)
+        if len(said) < len(parts) or "=" in name:
+            faults.append(f"line {n} must be a name and key=value, each key once: {line.strip()!r}")
+        found.append(Target(n, name, said))
+    return found, faults
+
+
+def target_faults(text: str) -> list[str]:
+    """What is wrong with a targets file, a sentence each; none where it can be flown."""
+    found, faults = read_targets(text)
+    names = [target.name for target in found]
+    if not found:
+        faults.append("there is no target")
+    for target in found:
+        where, said = f"target {target.name} in line {target.line}", target.said
+        if names.count(target.name) > 1 and names.index(target.name) < found.index(target):
+            faults.append(f"{where} stands twice")
+        if not re.fullmatch(r"\w+", target.name):
+            faults.append(f"{where} must have a name of letters and numbers")
+        for key in NEEDED:
+            if key not in said:
+                faults.append(f"{where} has no {key}")
+        for key in said:
+            if key not in (*NEEDED, *OPTIONAL):
+                faults.append(f"{where} says {key}, which is not known; look at its spelling")
+        for key in ("goto", "escape"):
+            if key in said and said[key] not in names:
+                faults.append(f"{where} has {key}={said[key]}, and there is no such target")
+        for key, most in (("lat", 90.0), ("lon", 180.0)):
+            faults += _angle_fault(where, key, said.get(key), most)
+        for key, bounds in {"radius": (1e-3, 1e6), **OPTIONAL}.items():
+            if bounds is not None and key in said and not _within(said[key], *bounds):
+                faults.append(
+                    f"{where} has {key}={said[key]}, and it must be from {bounds[0]:g} to {bounds[1]:g}"
+                )
+    return faults
+
+
+def _within(text: str, least: float, most: float) -> bool:
+    try:
+        return least <= float(text) <= most
+    except ValueError:
+        return False
+
+
+def _angle_fault(where: str, key: str, text: str | None, most: float) -> list[str]:
+    """What is wrong with an angle in degrees and minutes."""
+    if text is None:
+        return []
+    try:
+        angle = from_degrees_and_minutes(text)
+    except ValueError as error:
+        return [f"{where} has {key}={text}, and it must be degrees and minutes, (D)DDMM.m: {error}"]
+    return [] if abs(angle) <= most else [f"{where} has {key}={text}, {angle:g} degrees; at most {most:g}"]
+
+
+def target_points(text: str) -> tuple[list[tuple[float, float, float]], list[str]]:
+    """The targets from the first on as lon, lat [degrees], depth 0 [m], each by the one before, and what is open.
+
+    NotARoute where the vehicle would not fly them.
+    """
+    faults = target_faults(text)
+    if faults:
+        raise NotARoute(f"{faults[0]}; `glider-stream lint` says all that is wrong with it")
+    found, _ = read_targets(text)
+    by_name = {target.name: target for target in found}
+    way: list[str] = []
+    name = found[0].name
+    while name not in way:
+        way.append(name)
+        name = by_name[name].said["goto"]
+    notes = [f"the targets begin with {way[0]}, the first of the file; the vehicle may be sent to another"]
+    left = [target.name for target in found if target.name not in way]
+    if left:
+        notes.append(f"no goto leads from {way[0]} to {', '.join(left)}; they are not part of the route")
+    if name != way[-1]:
+        notes.append(f"the targets are flown again and again, from {name}; they are read once")
+    places = [[from_degrees_and_minutes(by_name[one].said[key]) for key in ("lon", "lat")] for one in way]
+    return [(lon, lat, 0.0) for lon, lat in places], notes

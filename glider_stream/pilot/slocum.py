@@ -1,4 +1,4 @@
-"""Slocum mission files: goto lists of waypoints, the yo between them, and a linter for either's traps.
+"""Slocum mission files of a route: goto lists of waypoints, and the yo between them.
 
 A waypoint carries no depth and a yo one envelope, so a plan with a trim for each leg is not fully expressible
 here; a vehicle with `u_use_current_correction` steers for itself, by waypoints, not by our headings.
@@ -6,19 +6,25 @@ here; a vehicle with `u_use_current_correction` steers for itself, by waypoints,
 
 import math
 import re
+from pathlib import Path as File
 
 import numpy as np
 
 from ..base.settings import require
 from ..search.path import Path
 from ..water.frame import wrapped
+from .slocum_files import LEAST_DEPTH, LEAST_RADIUS, MOST_DEPTH, MOST_WAYPOINTS, read_mission_file
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
-MOST_WAYPOINTS = 8
-"""Waypoints that a goto list may hold."""
-WITHIN = 500
-"""A waypoint counts as reached this near [m]."""
+RADIUS = 500.0
+"""A waypoint counts as reached this near [m], unless the pilot says otherwise."""
 NAME = re.compile(r"goto_l(\d\d)\.ma")
+SERIES = re.compile(r"# written by glider-stream: list (\d+) of the route that begins in (goto_l\d\d\.ma)")
+"""The comment by which a list of ours is known again."""
+ALTITUDE = 5
+"""The vehicle turns this far above the bottom [m] whatever the plan: masterdata's value."""
+STEEPEST = math.radians(26.0)
+"""The pitch of either half where the route has no leg of it: masterdata's value."""
 
 
 def list_number(name: str) -> int:
@@ -29,26 +35,37 @@ def list_number(name: str) -> int:
     return int(fits[1])
 
 
-def mission_files(path: Path, name: str, most: int = MOST_WAYPOINTS) -> dict[str, str]:
+def _list_name(number: int) -> str:
+    return f"goto_l{number:02}.ma"
+
+
+def mission_files(path: Path, name: str, most: int = MOST_WAYPOINTS, radius: float = RADIUS) -> dict[str, str]:
     """A route as numbered goto lists of `most` waypoints each, the first called `name`, and one yo file."""
+    require(1 <= most <= 99, f"a goto list must hold from 1 to 99 waypoints; got {most}")
+    least = f"a waypoint must be reached within {LEAST_RADIUS:g} m or more; got {radius:g}"
+    require(LEAST_RADIUS <= radius < math.inf, least)
     places, first = waypoints(path), list_number(name)
     parts = [places[n : n + most] for n in range(0, len(places), most)]
     last = first + len(parts) - 1
     require(last <= 99, f"{len(places)} waypoints need the lists {first} to {last}, past 99; begin lower")
-    lists = {f"goto_l{first + n:02}.ma": goto_list(part) for n, part in enumerate(parts)}
+    lists = {_list_name(first + n): goto_list(part, radius, n + 1, name) for n, part in enumerate(parts)}
     return lists | {f"yo{first:02}.ma": yo(path)}
 
 
-def goto_list(places: list[Waypoint]) -> str:
-    """The text of a goto list: longitude first, degrees and minutes packed; flown once, in order."""
+def goto_list(places: list[Waypoint], radius: float = RADIUS, part: int = 1, name: str = "goto_l10.ma") -> str:
+    """The text of a goto list: longitude first, degrees and minutes packed; flown once, in order.
+
+    It says which `part` it is of the route whose first list has a `name`.
+    """
     rows = [f"{degrees_and_minutes(float(wrapped(at.lon, 0.0)))}\t{degrees_and_minutes(at.lat)}" for at in places]
     return "\n".join([
         "behavior_name=goto_list",
+        f"# written by glider-stream: list {part} of the route that begins in {name}",
         "<start:b_arg>",
         "\tb_arg: num_legs_to_run(nodim) -2   # once",
         "\tb_arg: start_when(enum) 0          # immediately",
         "\tb_arg: list_stop_when(enum) 7      # within list_when_wpt_dist of the waypoint",
-        f"\tb_arg: list_when_wpt_dist(m) {WITHIN}",
+        f"\tb_arg: list_when_wpt_dist(m) {radius:g}",
         "\tb_arg: initial_wpt(enum) 0         # the first",
         f"\tb_arg: num_waypoints(nodim) {len(places)}",
         "<end:b_arg>",
@@ -59,23 +76,37 @@ def goto_list(places: list[Waypoint]) -> str:
 
 
 def yo(path: Path) -> str:
-    """The text of a yo file: the envelope of the route's legs."""
+    """The text of a yo file: the envelope of the route's legs, within what a Slocum can be told.
+
+    It never dives below the plan. InputError where the route is deeper than the vehicle goes, or where no yo is.
+    """
     depth = [-float(z) for leg in path.legs for z in (leg.start[2], leg.end[2])]
-    dives = [leg.glide_angle for leg in path.legs if leg.glide_angle < 0] or [-math.radians(26)]
-    climbs = [leg.glide_angle for leg in path.legs if leg.glide_angle > 0] or [-dives[0]]
+    deep, planned = math.floor(10 * max(depth) + 1e-6) / 10, max(0.0, min(depth))
+    shallow = max(LEAST_DEPTH, math.ceil(10 * planned - 1e-6) / 10)
+    limit = f"the route dives to {max(depth):g} m, and a Slocum's yo ends at {MOST_DEPTH:g} m; plan no deeper"
+    require(deep <= MOST_DEPTH, limit)
+    room = f"the route stays between {planned:g} and {max(depth):g} m, and a Slocum's yo turns at {LEAST_DEPTH:g}"
+    require(deep > shallow, f"{room} m and more; plan deeper, or write a file of another kind")
+    dives = [leg.glide_angle for leg in path.legs if leg.glide_angle < 0] or [-STEEPEST]
+    climbs = [leg.glide_angle for leg in path.legs if leg.glide_angle > 0] or [STEEPEST]
+    raised = "" if shallow == planned else f"   # the plan has {planned:g}, {LEAST_DEPTH:g} is the least"
     return "\n".join([
         "behavior_name=yo",
         f"# glide angles of the plan: dives {_range(dives)}, climbs {_range(climbs)} degrees; medians below",
         "# pitch is the glide angle less the angle of attack, some 3 degrees: trim it in the water",
+        "# buoyancy is the vehicle's default: add d_use_bpump, d_bpump_value and those of the climb to change it",
         "<start:b_arg>",
         "\tb_arg: start_when(enum) 2          # pitch idle",
         "\tb_arg: num_half_cycles_to_do(nodim) -1",
-        f"\tb_arg: d_target_depth(m) {max(depth):.0f}",
+        f"\tb_arg: d_target_depth(m) {deep:g}",
+        f"\tb_arg: d_target_altitude(m) {ALTITUDE}   # turns this far above the bottom; -1 ignores it",
         "\tb_arg: d_use_pitch(enum) 3         # servo",
-        f"\tb_arg: d_pitch_value(rad) {float(np.median(dives)):.4f}",
-        f"\tb_arg: c_target_depth(m) {min(depth):.0f}",
+        f"\tb_arg: d_pitch_value(X) {float(np.median(dives)):.4f}",
+        f"\tb_arg: c_target_depth(m) {shallow:g}{raised}",
+        "\tb_arg: c_target_altitude(m) -1",
         "\tb_arg: c_use_pitch(enum) 3         # servo",
-        f"\tb_arg: c_pitch_value(rad) {float(np.median(climbs)):.4f}",
+        f"\tb_arg: c_pitch_value(X) {float(np.median(climbs)):.4f}",
+        "\tb_arg: end_action(enum) 2          # resume",
         "<end:b_arg>",
     ]) + "\n"  # fmt: skip
 
@@ -85,42 +116,35 @@ def _range(angles: list[float]) -> str:
     return f"{low:.1f} to {high:.1f}"
 
 
-def lint(text: str) -> list[str]:
-    """What is wrong with a goto list, a sentence each; none where it can be flown."""
-    faults = []
-    lines = text.splitlines()
-    for n, line in enumerate(lines, 1):
-        if not line.isascii():
-            faults.append(f"line {n} has a character outside ASCII: {line.strip()!r}")
-    if not lines or lines[0].split("#")[0].strip() != "behavior_name=goto_list":
-        faults.append("the first line must be behavior_name=goto_list")
-    code = [line.split("#")[0].strip() for line in lines]
-    arguments = dict(re.findall(r"b_arg:\s*(\w+)\(\w+\)\s+(\S+)", "\n".join(code)))
+def clear_leftovers(folder: File, first: str, written: list[str]) -> list[str]:
+    """Remove the lists of an earlier, longer route of the same `first` name; a sentence for each that matters.
+
+    A list is removed where it is, to the letter, what this program writes. One that was changed by hand since is
+    the pilot's, and stays.
+    """
+    said, number = list[str](), list_number(first) + sum(1 for name in written if NAME.fullmatch(name))
+    while number <= 99 and (file := folder / _list_name(number)).is_file():
+        text = file.read_bytes()[:1_000_000].decode("utf-8", errors="replace")
+        series = SERIES.search(text)
+        if series is None or series[2] != first:
+            break
+        if text == _written_again(text, int(series[1]), first):
+            file.unlink()
+            said.append(f"removed {file}, which an earlier, longer route had left")
+        else:
+            said.append(
+                f"{file} is of an earlier route, and was changed since: it stays; remove it unless you need it"
+            )
+        number += 1
+    return said
+
+
+def _written_again(text: str, part: int, first: str) -> str | None:
+    """What this program would write for the waypoints of a list; None where it cannot be one of ours."""
+    file = read_mission_file(text)
+    radius = next((one.value for one in file.arguments if one.name == "list_when_wpt_dist"), "")
     try:
-        rows = [row for row in code[code.index("<start:waypoints>") + 1 : code.index("<end:waypoints>")] if row]
+        rows = [[from_degrees_and_minutes(part) for part in row.split()] for _, row in file.rows]
+        return goto_list([Waypoint(lon, lat) for lon, lat in rows], float(radius), part, first)
     except ValueError:
-        return [*faults, "the waypoints must stand between <start:waypoints> and <end:waypoints>"]
-    said = arguments.get("num_waypoints")
-    if said != str(len(rows)):
-        faults.append(f"num_waypoints is {said}, and there are {len(rows)} rows")
-    if len(rows) > MOST_WAYPOINTS:
-        faults.append(f"{len(rows)} waypoints are more than {MOST_WAYPOINTS}")
-    if arguments.get("num_legs_to_run") == "0":
-        faults.append("num_legs_to_run must not be 0")
-    if arguments.get("initial_wpt", "0") not in ("0", "-1", "-2", *map(str, range(len(rows)))):
-        faults.append(f"initial_wpt is {arguments['initial_wpt']}, no waypoint's number")
-    if arguments.get("initial_wpt") == "-2" and len(rows) > 1:
-        faults.append("initial_wpt is -2, the closest: an ordered route begins at 0")
-    for row in rows:
-        faults += _row_faults(row)
-    return faults
-
-
-def _row_faults(row: str) -> list[str]:
-    try:
-        _, lat = (from_degrees_and_minutes(part) for part in row.split())
-    except ValueError as error:
-        return [f"the row {row!r} is no longitude and latitude, DDDMM.mmmm DDMM.mmmm: {error}"]
-    if abs(lat) > 90:
-        return [f"the row {row!r} has a latitude of {lat:g}; the longitude stands first"]
-    return []
+        return None

@@ -8,6 +8,7 @@ import contextlib
 import importlib
 import warnings
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,6 +96,13 @@ def said_time(seconds: float) -> str:
     """A span of time in words."""
     unit, name = time_unit(seconds)
     return f"{seconds / unit:.3g} {name}"
+
+
+def said_when(steady: bool, seconds: float, departs: datetime | None) -> str:
+    """The time of a map, of a flow that changes: the departure's date where it is known, else its seconds."""
+    if steady:
+        return ""
+    return f", t = {said_time(seconds)}" if departs is None else f", {departs:%Y-%m-%d %H:%M} UTC"
 
 
 def thinned(count: int, most: int) -> NDArray[np.intp]:

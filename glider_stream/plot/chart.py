@@ -1,6 +1,7 @@
 """A route as its pilot follows it: a chart with the coast and the fronts, and what happens when."""
 
 from collections.abc import Sequence
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import Along, along
-from .canvas import GREY, INK, colours, frozen, new_figure, said_time, styled, time_unit
+from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
 from .seabed import known_until, sample_bottom
@@ -65,7 +66,8 @@ def plot_chart(
         clock = _Clock(unit, name, Normalize(0.0, float(rows[-1, 0]) / unit))
         said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         if path.departs is not None:
-            said += f", departs {path.departs:%Y-%m-%d %H:%M} UTC"
+            arrives = path.departs + timedelta(seconds=path.travel_time)
+            said += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
         figure = new_figure(14.0, 8.6, f"{title}: {said}" if title else f"Route: {said}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
@@ -74,7 +76,7 @@ def plot_chart(
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
-        when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+        when = said_when(is_steady(flow), problem.departure, problem.departs)
         every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])

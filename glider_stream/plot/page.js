@@ -20,8 +20,8 @@ const chooseLeg = (n) => {
     ["Heading", `${leg.heading.toFixed(1)}°`],
     ["Glide angle", `${leg.glide.toFixed(1)}°`],
     ["Depths", `${from.toFixed(0)} to ${to.toFixed(0)} m`],
-    ["Departs", spanName(leg.depart)],
-    ["Arrives", spanName(leg.depart + leg.duration)],
+    ["Departs", momentName(leg.depart)],
+    ["Arrives", momentName(leg.depart + leg.duration)],
     ["Takes", spanName(leg.duration)],
     ["Through water", `${leg.speed.toFixed(3)} m/s`],
     ["Over ground", leg.ground === null ? null : `${leg.ground.toFixed(3)} m/s`],
@@ -40,8 +40,8 @@ const chooseTime = (time) => {
   placeMarks();
   markProfile();
   at("time").value = (1000 * chosen.time) / total;
-  at("time").setAttribute("aria-valuetext", spanName(chosen.time));
-  at("clock").textContent = spanName(chosen.time);
+  at("time").setAttribute("aria-valuetext", momentName(chosen.time));
+  at("clock").textContent = momentName(chosen.time);
   describe(at("now"), [
     ["Time", spanName(chosen.time)],
     ["Date", dateName(chosen.time)],
@@ -75,8 +75,8 @@ const dress = (dark) => {
 
 // words and choices
 at("title").textContent = data.title;
-const departs = dateName(0);
-at("said").textContent = departs ? `${data.said}, departs ${departs}` : data.said;
+at("said").textContent = data.departs === null
+  ? data.said : `${data.said}, departs ${dateName(0)}, arrives ${dateName(total)}`;
 at("when").textContent = data.when;
 at("speed-most").textContent = `${data.current.fastest.toFixed(2)} m/s`;
 at("time-most").textContent = spanName(total);
@@ -102,7 +102,7 @@ for (const title of titles) head.append(Object.assign(document.createElement("th
 legs.forEach((leg, n) => {
   const row = body.insertRow(), [from, to] = ends(leg);
   const cells = [
-    n + 1, kind(leg), spanName(leg.depart), spanName(leg.depart + leg.duration), metres(from), metres(to),
+    n + 1, kind(leg), momentName(leg.depart), momentName(leg.depart + leg.duration), metres(from), metres(to),
     `${leg.heading.toFixed(1)}°`, `${leg.glide.toFixed(1)}°`, leg.ground === null ? "" : `${leg.ground.toFixed(2)} m/s`,
     placeName(leg.x[leg.x.length - 1], leg.y[leg.y.length - 1]),
   ];

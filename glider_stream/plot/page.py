@@ -22,7 +22,7 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import length_unit, said_time, thinned, time_unit
+from .canvas import length_unit, said_time, said_when, thinned, time_unit
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import known_until, sample_bottom
@@ -98,7 +98,7 @@ def page_text(held: dict[str, Any], title: str) -> str:
 
 def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str, Any]:
     unit, name = time_unit(path.travel_time)
-    when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+    when = said_when(is_steady(flow), problem.departure, problem.departs)
     legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
     return {
         "title": title or "Route",

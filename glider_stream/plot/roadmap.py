@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
-from .canvas import INK, colours, frozen, new_figure, said_time, styled, thinned, time_unit
+from .canvas import INK, colours, frozen, new_figure, said_time, said_when, styled, thinned, time_unit
 from .scene import MAX_NODES, draw_current, draw_space
 from .water import Frame, checked_depths, frame_of
 
@@ -43,7 +43,7 @@ def plot_roadmap(
         ax = left.add_subplot()
         image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.5, arrows=24)
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
-        when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+        when = said_when(is_steady(flow), problem.departure, problem.departs)
         _draw_edges(ax, frame, roadmap, f"over the current at {depth:.4g} m{when}")
         _draw_degree(right.add_subplot(2, 2, 1, projection="3d"), terrain, frame, roadmap)
         _draw_facts(right.add_subplot(2, 2, 2), roadmap)

@@ -10,7 +10,7 @@ from ..base.settings import require
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
-from .canvas import GREY, INK, colours, frozen, new_figure, said_time, styled, time_unit
+from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
 from .scene import draw_current, draw_ends, draw_space, stretch
 from .water import Frame, checked_depths, frame_of, sample_field
 
@@ -71,6 +71,10 @@ def plot_route(
         frame = frame_of(problem, np.vstack([rows[:, 1:], stops]))
         norm = Normalize(frame.top, frame.bottom)
         said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        # a date beside each depth would cover the next map's title
+        when = said_when(is_steady(flow), problem.departure, problem.departs)
+        dated = when if problem.departs is not None else ""
+        said += f"; currents of {dated.removeprefix(', ')}" if dated else ""
         figure = new_figure(13.0, 9.8, f"{title}: {said}" if title else f"Route: {said}")
         levels = map_depths(position, frame, depths)
         columns, filled = map_columns(levels.size, frame)
@@ -83,8 +87,7 @@ def plot_route(
         maps = [figure.add_subplot(cells[n // columns, n % columns]) for n in range(levels.size)]
         for n, (ax, depth) in enumerate(zip(maps, levels, strict=True)):
             draw_current(ax, flow, terrain, frame, depth, problem.departure)
-            when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
-            ax.set_title(f"{'(b) ' if n == 0 else ''}Current at {depth:.4g} m{when}")
+            ax.set_title(f"{'(b) ' if n == 0 else ''}Current at {depth:.4g} m{'' if dated else when}")
             below, left = n + columns >= levels.size, n % columns == 0
             ax.set(xlabel=frame.labels[0] * below, ylabel=frame.labels[1] * left)
             ax.tick_params(labelbottom=below, labelleft=left)

@@ -11,7 +11,7 @@ from scipy.optimize import root
 
 from ..base.arrays import Array
 from ..kernels.control import CLIMB, DIVE
-from ..kernels.edges import Status
+from ..kernels.edges import STATUS, Status
 from ..roadmap.evaluator import Evaluator
 from ..roadmap.neighbours import AllNodes, as_csr
 from ..roadmap.steering import FlowMapMethod, Method, StreamlineMethod
@@ -155,7 +155,7 @@ def _draw_mesh(
     nodes, rows = replace(evaluator, steering=FlowMapMethod()).reach_point(
         position, fan.start, problem.departure, False
     )
-    reached = np.isin(at_depth, nodes[rows[:, 0] == Status.CONNECTED])
+    reached = np.isin(at_depth, nodes[rows[:, STATUS] == Status.CONNECTED])
     for which, face in ((reached, INK), (~reached, "white")):
         there = position[at_depth[which], :2] / frame.unit
         ax.scatter(*there.T, s=14, facecolors=face, edgecolors=INK, linewidths=0.6, zorder=5)
@@ -214,13 +214,13 @@ def _draw_found(ax: Any, evaluator: Evaluator, problem: "Problem", position: Arr
         for name, method in methods.items()
     }
     exact = rows["flow map"]
-    there = exact[:, 0] == Status.CONNECTED
+    there = exact[:, STATUS] == Status.CONNECTED
     unit, name_of_unit = time_unit(float(exact[there, 1].max(initial=0.0)))
     edges = np.linspace(0.0, float(exact[there, 1].max(initial=1.0)) / unit, 26)
     for (name, found), (face, hatch) in zip(
         rows.items(), (("#d9d9d9", ""), ("#7fa6c9", "///"), ("#1f4e79", "")), strict=True
     ):
-        both = there & (found[:, 0] == Status.CONNECTED)
+        both = there & (found[:, STATUS] == Status.CONNECTED)
         share = both.sum() / max(there.sum(), 1)
         label = f"{name}: {both.sum():,} ({share:.0%})"
         ax.hist(

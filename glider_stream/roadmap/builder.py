@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..base.threads import threads
-from ..kernels.edges import Status
+from ..kernels.edges import STATUS, TIME, Status
 from .pairs import Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
 from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
+from .step_error import with_steps_checked
 
 BATCH_PAIRS = 100_000
 
@@ -74,12 +75,12 @@ def find_edges(
 def _evaluated(legs: Legs, source: Index) -> Edges:
     began = time.perf_counter()
     batch = legs.of(source)
-    status = batch.outcomes[:, 0].astype(np.int64)
+    status = batch.outcomes[:, STATUS].astype(np.int64)
     connected = status == Status.CONNECTED
     node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
     counts = np.bincount(node * len(Status) + status, minlength=len(source) * len(Status))
     by_node: NDArray[np.int32] = counts.reshape(len(source), len(Status)).astype(np.int32)
-    target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, 1:]
+    target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, TIME:]
     degree = np.bincount(node[connected], minlength=len(source))
     return Edges(source, degree, target, values, by_node, time.perf_counter() - began)
 
@@ -119,6 +120,12 @@ def build_roadmap(
     parts: list[Edges] = []
     with threads(thread_count) as used:
         warm_up(problem)
+        made = with_steps_checked(
+            provenance_of(problem, position),
+            problem,
+            position,
+            lambda nodes: in_order(list(find_edges(problem, position, nodes, batch_pairs))),
+        )
         tally = Tally(len(position), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
             parts.append(edges)
@@ -128,7 +135,7 @@ def build_roadmap(
         position=position,
         indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
         target=whole.target,
-        provenance=provenance_of(problem, position),
+        provenance=made,
         lonlat=lonlat_of(problem, position),
         counts=tally.by_name(),
         wall_s=tally.seconds,

@@ -1,6 +1,5 @@
 """Edge evaluation for callers from Python: casts arrays, checks them, calls the kernels."""
 
-import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,8 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..base.threads import in_parallel
-from ..kernels import connect, control, edges, fan, flow, motion, reach, refine, terrain
-from ..kernels.edges import Edge, Status
+from ..kernels import connect, control, edges, fan, flow, motion, refine, terrain
+from ..kernels.connect import Pairs
+from ..kernels.edges import EDGE_COLUMNS, STATUS, Edge, Status, edge_of
+from ..kernels.patch import Nodes
+from ..kernels.place import Pair, Place
+from ..kernels.reach import LEG_COLUMNS, LEG_EDGE, LEG_NODE, Legs, Points, answer, quick_statuses, reach_points
 from ..vehicle.cost import Cost, TravelTime
 from ..water.inspect import is_steady
 from .bins import node_bins
@@ -59,26 +62,26 @@ class Evaluator:
         for name, index in (("source", sources), ("target", targets)):
             inside = index.size == 0 or (index.min() >= 0 and index.max() < len(nodes))
             require(inside, f"`{name}` must hold node numbers below {len(nodes)}; got others")
-        pairs = nodes, departs, sources, rows, targets
+        pairs = Pairs(nodes, departs, sources, rows, targets)
         result: Array
         if isinstance(self.steering, FlowMapMethod):
-            result = self._connect_by_fan(*pairs)
+            result = self._connect_by_fan(pairs)
         else:
-            result = np.empty((targets.size, 7))
+            result = np.empty((targets.size, EDGE_COLUMNS))
             refines = isinstance(self.steering, StreamlineMethod) and self.steering.refine
             kernel = refine.refine_nodes if refines else connect.connect_nodes
-            task = partial(kernel, self.medium, self.steering.kernel(), *pairs, result)
+            task = partial(kernel, self.medium, self.steering.kernel(), pairs, result)
             in_parallel(task, sources.size, NODES_AT_ONCE)
         return result
 
-    def _connect_by_fan(self, nodes: Array, departs: Array, sources: Index, rows: Index, targets: Index) -> Array:
-        result = np.empty((targets.size, 7))
-        quick = partial(reach.quick_statuses, self.medium, nodes, departs, sources, rows, targets, result)
-        in_parallel(quick, sources.size, NODES_AT_ONCE)
-        may = result[:, 0] == Status.NO_HIT
-        wanted = np.concatenate([[0], np.cumsum(may)])[rows].astype(np.int64), targets[may]
-        legs = self._reach(nodes, nodes[sources], departs[sources], False, *wanted, 0)
-        in_parallel(partial(reach.answer, rows, targets, *legs, result), sources.size, NODES_AT_ONCE)
+    def _connect_by_fan(self, pairs: Pairs) -> Array:
+        source, result = pairs.source, np.empty((pairs.target.size, EDGE_COLUMNS))
+        in_parallel(partial(quick_statuses, self.medium, pairs, result), source.size, NODES_AT_ONCE)
+        may = result[:, STATUS] == Status.NO_HIT
+        indptr = np.concatenate([[0], np.cumsum(may)])[pairs.indptr].astype(np.int64)
+        ends = pairs.position[source], pairs.departure[source]
+        legs = self._reach(pairs.position, Points(*ends, False, indptr, pairs.target[may]), 0)
+        in_parallel(partial(answer, pairs, *legs, result), source.size, NODES_AT_ONCE)
         return result
 
     @property
@@ -101,61 +104,45 @@ class Evaluator:
 
         Only the fastest `limit` of each vertical direction, all where it is 0. Targets rise within a row.
         """
-        nobody = np.empty(0, np.int64)
-        departs = np.full(source.size, departure)
-        return self._reach(position, position[source], departs, False, nobody, nobody, limit)
+        return self._reach(position, _asking_for_all(position[source], departure, False), limit)
 
     def reach_point(self, position: Array, point: Array, departure: float, backward: bool) -> tuple[Index, Array]:
         """The nodes that lie under the fan of a `point` (3,) [m], and the legs to them: (nodes, outcomes).
 
         With `backward`, in a steady flow, those that reach it, and the legs from them.
         """
-        nobody = np.empty(0, np.int64)
-        departs = np.full(1, departure)
-        return self._reach(position, np.reshape(point, (1, 3)), departs, backward, nobody, nobody, 0)[1:]
+        return self._reach(position, _asking_for_all(np.reshape(point, (1, 3)), departure, backward), 0)[1:]
 
-    def _reach(
-        self,
-        position: Array,
-        origin: Array,
-        departs: Array,
-        backward: bool,
-        indptr: Index,
-        target: Index,
-        limit: int,
-    ) -> tuple[Index, Index, Array]:
+    def _reach(self, position: Array, points: Points, limit: int) -> tuple[Index, Index, Array]:
+        count = len(points.position)
         if len(position) == 0:
-            return np.zeros(len(origin) + 1, np.int64), np.empty(0, np.int64), np.empty((0, 7))
-        nodes, points = (np.require(a, np.float64, ["C", "W"]) for a in (position, origin))
-        how = self.medium, self.steering.kernel(), node_bins(nodes)
-        ends = nodes, points, departs, backward, indptr, target, limit
-        room = 2 * limit if limit else min(len(nodes), MOST_LEGS)
-        if indptr.size > 0:
-            room = int(np.diff(indptr).max(initial=1))
-        counts = np.zeros(len(points), np.int64)
+            return np.zeros(count + 1, np.int64), np.empty(0, np.int64), np.empty((0, EDGE_COLUMNS))
+        where = np.require(position, np.float64, ["C", "W"])
+        nodes = Nodes(where, node_bins(where), np.empty(0, np.bool_))
+        room = 2 * limit if limit else min(len(where), MOST_LEGS)
+        if points.indptr.size > 0:
+            room = int(np.diff(points.indptr).max(initial=1))
+        counts = np.zeros(count, np.int64)
         while True:
-            found = np.empty((len(points), room, reach.ROW - 1))
-            task = partial(reach.reach_points, *how, *ends, counts, found)
-            in_parallel(task, len(points), NODES_AT_ONCE)
+            legs = Legs(counts, np.empty((count, room, LEG_COLUMNS)))
+            task = partial(reach_points, self.medium, self.steering.kernel(), nodes, points, limit, legs)
+            in_parallel(task, count, NODES_AT_ONCE)
             if counts.max(initial=0) <= room:
                 break
             room = int(counts.max())
-        rows = found[np.arange(room) < counts[:, None]]
+        rows = legs.rows[np.arange(room) < counts[:, None]]
         first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        return first, rows[:, 0].astype(np.int64), np.ascontiguousarray(rows[:, 1:])
+        targets = rows[:, LEG_NODE].astype(np.int64)
+        return first, targets, np.ascontiguousarray(rows[:, LEG_EDGE:])
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
         """The outcome of one pair of points (3,) [m]."""
-        row = self.connect(np.array([start, goal], np.float64), departure, [0], [0, 1], [1])[0]
-        return Edge(int(row[0]), *(float(value) for value in row[1:]))
+        return edge_of(self.connect(np.array([start, goal], np.float64), departure, [0], [0, 1], [1])[0])
 
     def trace(self, start: ArrayLike, edge: Edge, departure: float) -> Array:
         """The path of an edge from `start` (3,) [m]: rows [t, x, y, z] to its closest approach."""
-        x, y, z = (float(value) for value in np.asarray(start, np.float64))
-        along = edge.speed * math.cos(edge.glide_angle)
-        u, v = along * math.cos(edge.heading), along * math.sin(edge.heading)
-        w = edge.speed * math.sin(edge.glide_angle)
-        rows: Array = motion.traced(self.flow, x, y, z, departure, u, v, w, edge.time, self.integration.dt)
+        through = control.control_of(edge.speed, edge.glide_angle, edge.heading)
+        rows: Array = motion.traced(self.flow, _place(start, departure), through, edge.time, self.integration.dt)
         return rows
 
     def landings(
@@ -165,19 +152,18 @@ class Evaluator:
 
         `glide_angle` (its magnitude) and `heading` [rad] (n,).
         """
-        x, y, z = (float(value) for value in np.asarray(start, np.float64))
-        require(height != z, f"a control cannot land at its own height; got {height:g} m for both")
+        origin = _place(start, departure)
+        require(height != origin.z, f"a control cannot land at its own height; got {height:g} m for both")
         angles, headings = (np.require(a, np.float64, ["C", "W"]) for a in (glide_angle, heading))
-        direction = control.CLIMB if height > z else control.DIVE
-        where: Array = fan.landings(
-            self.flow, self.polar, direction, x, y, z, departure, height, angles, headings, self.integration.dt
-        )
+        direction = control.CLIMB if height > origin.z else control.DIVE
+        launch = fan.Launch(origin, direction, self.integration.dt)
+        where: Array = fan.landings(self.medium, launch, float(height), angles, headings)
         return where
 
     def control_line(self, start: ArrayLike, goal: ArrayLike, candidates: int, departure: float = 0.0) -> Array:
         """The pair's controls on its control line: magnitude of the glide angle and heading (n, 2) [rad]."""
-        ends = [float(value) for value in (*np.ravel(start), *np.ravel(goal))]
-        where: Array = connect.line_controls(self.medium, control.Streamline(candidates), *ends, departure)
+        pair = Pair(_place(start, departure), _place(goal, departure))
+        where: Array = connect.line_controls(self.medium, control.Streamline(candidates), pair)
         return where
 
     def allowed(self, points: Array, t: float = 0.0) -> NDArray[np.bool_]:
@@ -189,3 +175,15 @@ class Evaluator:
             ],
             dtype=bool,
         )
+
+
+def _place(point: ArrayLike, t: float) -> Place:
+    x, y, z = (float(value) for value in np.asarray(point, np.float64))
+    return Place(x, y, z, float(t))
+
+
+def _asking_for_all(position: Array, departure: float, backward: bool) -> Points:
+    """Points (n, 3) [m] that ask for all nodes under their fans."""
+    nobody = np.empty(0, np.int64)
+    places = np.require(position, np.float64, ["C", "W"])
+    return Points(places, np.full(len(places), departure, np.float64), backward, nobody, nobody)

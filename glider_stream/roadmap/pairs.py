@@ -17,7 +17,7 @@ SAMPLED = 16
 
 @dataclass(frozen=True)
 class Found:
-    """Pairs that were looked at: CSR `indptr` (sources + 1,), `target` (pairs,), rows of `Edge` (pairs, 7)."""
+    """Pairs that were looked at: CSR `indptr` (sources + 1,), `target` (pairs,), `outcomes` (pairs, 7)."""
 
     indptr: Index
     target: Index
@@ -26,7 +26,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Attached:
-    """Pairs of one point with nodes (n,), either way; rows of `Edge` (n, 7)."""
+    """Pairs of one point with nodes (n,), either way; `outcomes` (n, 7): rows of Edge's fields."""
 
     nodes: Index
     outcomes: Array

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
+from ..kernels.flow import contains
+from ..water.domain import BoxDomain, GeographicDomain
 from .evaluator import Evaluator
 from .neighbours import NeighbourLaw, Reachable
 from .nodes import Sampler
@@ -20,7 +22,7 @@ class Problem:
 
     `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
-    where known. `flow_words`, `glider_words` say what they are.
+    where known. `flow_words`, `glider_words` say what they are. `domain` is that of the scenario.
     """
 
     evaluator: Evaluator
@@ -36,6 +38,7 @@ class Problem:
     glider_words: str
     to_lonlat: Callable[[Array], Array] | None = None
     departs: datetime | None = None
+    domain: BoxDomain | GeographicDomain | None = None
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""
@@ -47,9 +50,13 @@ class Problem:
         require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
         require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
         require(bool(point[2] >= self.lo[2]), f"`{name}` = {said} lies below the {deepest}; move it up")
-        inside = bool(self.evaluator.allowed(point[None], self.departure)[0])
-        where = "outside the flow, on land or too near the seabed"
-        require(inside, f"`{name}` = {said} lies {where}; move it into open water")
+        if bool(self.evaluator.allowed(point[None], self.departure)[0]):
+            return
+        outside = "" if self.domain is None else self.domain.outside(shown[0], shown[1])
+        require(not outside, f"`{name}` = {said} lies {outside}")
+        there = contains(self.evaluator.flow, float(point[0]), float(point[1]), self.departure)
+        where = "on land, in a keep-out area or too near the seabed" if there else "outside the flow"
+        require(False, f"`{name}` = {said} lies {where}; move it into open water")
 
     def legs(self, position: Array) -> Legs:
         """How legs among these nodes (n, 3) [m] are found."""

@@ -32,6 +32,7 @@ class Provenance:
     libraries: str = ""
     machine: str = ""
     cost_unit: str = "s"
+    steps: str = ""
 
     def identity(self) -> dict[str, str]:
         """What two roadmaps, or parts of one, must share to hold the same edges."""
@@ -156,11 +157,12 @@ class Roadmap:
 
     def __str__(self) -> str:
         others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
+        steps = f"  steps:  {self.provenance.steps}\n" if self.provenance.steps else ""
         return (
             f"Roadmap: {len(self.position):,} nodes, {self.target.size:,} edges\n"
             f"  pairs:  {self.evaluated:,} evaluated, {self.connected_share:.1%} connected ({others})\n"
             f"  flow:   {self.provenance.flow}\n"
-            f"  glider: {self.provenance.glider}\n"
+            f"  glider: {self.provenance.glider}\n{steps}"
             f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
             f"{self.provenance.created}\n"
             f"  by:     glider-stream {self.provenance.software_version}"

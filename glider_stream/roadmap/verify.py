@@ -13,9 +13,11 @@ from ..base.errors import InputError
 from ..base.settings import require
 from ..base.threads import in_parallel, threads
 from ..kernels.cache import entry_point
-from ..kernels.control import glide_speed
+from ..kernels.control import control_of, glide_speed
+from ..kernels.edges import CONNECTED, EDGE_COLUMNS, GLIDE_ANGLE, HEADING, SPEED, TIME
 from ..kernels.flow import velocities
 from ..kernels.motion import rk4_step
+from ..kernels.place import Place
 from .evaluator import Evaluator
 from .problem import Problem
 from .provenance import check_unchanged
@@ -115,24 +117,26 @@ def replayed_misses(
 
 
 @entry_point(nogil=True)
-def _fly(medium, position, departure, source, target, values, off, first, last):  # type: ignore[no-untyped-def]
-    """Distance [m] from their targets at which legs end, and what their speed is off by [m/s]: off (n, 2)."""
+def _fly(medium, position, departure, source, target, edges, off, first, last):  # type: ignore[no-untyped-def]
+    """Distance [m] from their targets at which legs end, and what their speed is off by [m/s]: off (n, 2).
+
+    `edges` (n, EDGE_COLUMNS), from node `source` (n,) to node `target` (n,).
+    """
     dt = medium.integration.dt
     latest = dt * (medium.integration.steps + 1)
     for e in range(first, last):
-        time, angle, heading, speed = values[e, 0], values[e, 2], values[e, 3], values[e, 4]
+        time, angle, speed = edges[e, TIME], edges[e, GLIDE_ANGLE], edges[e, SPEED]
         off[e] = np.inf
         if not time <= latest:
             continue  # a damaged file may say anything
-        along, w = speed * np.cos(angle), speed * np.sin(angle)
-        u, v = along * np.cos(heading), along * np.sin(heading)
+        c = control_of(speed, angle, edges[e, HEADING])
         x, y, z = position[source[e]]
         full = int(time / dt)
         for n in range(full + 1):
-            step = min(dt, time - n * dt)
-            x, y = rk4_step(medium.flow, x, y, z + n * dt * w, departure + n * dt, u, v, w, step)
+            here = Place(x, y, z + n * dt * c.w, departure + n * dt)
+            x, y = rk4_step(medium.flow, here, c, min(dt, time - n * dt))
         goal = position[target[e]]
-        off[e, 0] = np.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z + time * w - goal[2]) ** 2)
+        off[e, 0] = np.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z + time * c.w - goal[2]) ** 2)
         off[e, 1] = speed - glide_speed(medium.polar, 1 if angle > 0.0 else 0, abs(angle))
 
 
@@ -158,10 +162,13 @@ def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Veri
     evaluator, position = problem.evaluator, np.require(road.position, np.float64, ["C", "W"])
     source = np.repeat(np.arange(len(position)), np.diff(road.indptr))
     target = road.target.astype(np.int64)
-    values = np.ascontiguousarray(np.stack([getattr(road, field) for field in EDGE_FIELDS], axis=1))
+    edges = np.empty((target.size, EDGE_COLUMNS))
+    edges[:] = np.column_stack(
+        [np.full(target.size, CONNECTED), *(getattr(road, field) for field in EDGE_FIELDS)]
+    )
     off = np.empty((target.size, 2))
     with threads(None):
-        task = partial(_fly, evaluator.medium, position, problem.departure, source, target, values, off)
+        task = partial(_fly, evaluator.medium, position, problem.departure, source, target, edges, off)
         in_parallel(task, target.size, EDGES_AT_ONCE)
     horizon = evaluator.integration.dt * evaluator.integration.steps
     polar = evaluator.polar
@@ -190,7 +197,7 @@ def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Veri
     ]
     size = target.size if sample == 0 else min(sample, target.size)
     some = np.sort(np.random.default_rng(0).choice(target.size, size, replace=False))
-    ends = evaluator, problem.departure, position, source[some], target[some], values[some]
+    ends = evaluator, problem.departure, position, source[some], target[some], edges[some, TIME:]
     differences = np.abs(replayed_misses(*ends) - road.miss[some])
     most = MOST_OFF * evaluator.integration.tolerance
     far = differences > most

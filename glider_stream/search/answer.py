@@ -47,9 +47,10 @@ def _within(planner: Planner, ends: Ends, most_energy: float) -> Path:
     within = paths.within(most_energy)
     if within:
         return replace(within, least_time=paths.least_time(most_energy))
-    last, why = paths.paths[-1], ""
-    if last.found:
-        why = f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}"
+    last = paths.paths[-1]
+    if not last.found:
+        return last
+    why = f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}"
     return replace(last, cost=math.inf, legs=(), why=why)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path as File
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.clock import moment, span
 from ..base.errors import InputError
 from ..base.settings import require
 from ..kernels.edges import Edge, Status
@@ -66,13 +68,14 @@ class Leg:
             "trajectory": self.trajectory.tolist(),
         }
 
-    def __str__(self) -> str:
+    def told(self, departs: datetime | None) -> str:
+        """A line for people; of a path that `departs` (UTC) then, if that is known."""
         way, glide = "climb" if self.glide_angle > 0 else "dive ", math.degrees(self.glide_angle)
         # a geographic scenario speaks of depths, any other of heights
         begin, end = (z if self.lonlat is None else 0.0 - z for z in (self.start[2], self.end[2]))
         there = "" if self.lonlat is None else "  at {:.4f}, {:.4f}".format(*self.lonlat[1])
         return (
-            f"{self.depart:9,.0f} s  {way} {begin:7.0f} m to {end:6.0f} m{there}  "
+            f"{moment(departs, self.depart):>9}  {way} {begin:7.0f} m to {end:6.0f} m{there}  "
             f"glide {glide:6.1f} deg  compass {self.compass:5.1f} deg  "
             f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
         )
@@ -83,7 +86,8 @@ class Path:
     """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
 
     From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
-    `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, if that is known.
+    `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, and `why_not`, the same
+    for JSON, if that is known; `notes` on files written of it.
     `unthinned`: how many legs and seconds it had before it was thinned. `least_time` [s]: no path within the
     bound on energy that was asked for takes less.
     """
@@ -98,6 +102,8 @@ class Path:
     why: str = ""
     unthinned: tuple[int, float] | None = None
     least_time: float | None = None
+    why_not: Mapping[str, Any] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def found(self) -> bool:
@@ -127,6 +133,9 @@ class Path:
             **energy,
             **thinned,
             **({} if self.least_time is None else {"least_time_s": self.least_time}),
+            **({} if self.found or not self.why else {"why": self.why}),
+            **({} if self.why_not is None else {"why_not": dict(self.why_not)}),
+            **({"notes": list(self.notes)} if self.notes else {}),
             "legs": [leg.as_dict() for leg in self.legs],
         }
 
@@ -140,14 +149,14 @@ class Path:
             why = self.why or "more nodes, neighbours or candidates may find one"
             return f"no path from {start} to {goal}; {why}"
         count = f"{len(self.legs)} leg{'' if len(self.legs) == 1 else 's'}"
-        hours = f" ({self.travel_time / 3600:.1f} h)" if self.travel_time >= 7200 else ""
+        arrives = "" if self.departs is None else f", arrives {moment(self.departs, self.travel_time)}"
         energy = f", {self.cost / 1000:,.1f} kJ" if self.unit == "J" else ""
-        title = f"path from {start} to {goal}: {count}, {self.travel_time:,.0f} s{hours}{energy}"
+        title = f"path from {start} to {goal}: {count}, {span(self.travel_time)}{arrives}{energy}"
         if self.least_time is not None:
-            title += f"; no path within the bound takes less than {self.least_time:,.0f} s"
+            title += f"; no path within the bound takes less than {span(self.least_time)}"
         if self.unthinned is not None:
-            title += f"; before it was thinned {self.unthinned[0]}, {self.unthinned[1]:,.0f} s"
-        return "\n".join([title, *(f"  {leg}" for leg in self.legs)])
+            title += f"; before it was thinned {self.unthinned[0]}, {span(self.unthinned[1])}"
+        return "\n".join([title, *(f"  {leg.told(self.departs)}" for leg in self.legs)])
 
 
 def hops_of(path: Path) -> list[Hop]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
 from typing import Any
@@ -14,13 +14,15 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Index
 from ..base.settings import require
-from ..kernels.edges import Edge, Status
+from ..kernels.edges import COST, GLIDE_ANGLE, STATUS, TIME, Edge, Status, edge_of
 from ..roadmap.pairs import Attached, Legs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
+from ..roadmap.step_error import check_steps
 from ..water.frame import true_north
 from .path import Leg, Path
+from .why_not import why_not
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
@@ -71,6 +73,7 @@ class Planner:
     def __init__(self, roadmap: Roadmap, problem: Problem) -> None:
         """Check that flow and glider are those that the roadmap was built with."""
         check_unchanged(roadmap, problem)
+        check_steps(roadmap, problem)
         self.roadmap = roadmap
         self.problem = problem
         self._kept: tuple[Blend, Array] | None = None
@@ -87,7 +90,11 @@ class Planner:
         A point that is a node is used as it is; any other is attached by its own neighbours, and the leg
         from end to end is looked at, too. `blend` makes another sum the least.
         """
-        return self.queries(start, [goal], blend)[0]
+        path = self.queries(start, [goal], blend)[0]
+        if path.found:
+            return path
+        reason = why_not(self.problem, *self._reached(path.start), path.start, path.goal)
+        return replace(path, why=str(reason), why_not=reason.as_dict())
 
     def queries(
         self,
@@ -106,6 +113,10 @@ class Planner:
         search = self._search(self._start(start), Blend(0.0, 1.0))
         nodes = len(self.roadmap.position)
         return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
+
+    def _reached(self, start: Array) -> tuple[Array, Array]:
+        """The nodes' places (n, 3) [m], and when each can be reached from a start at the soonest (n,) [s]."""
+        return self.roadmap.position, self.arrivals(start)
 
     def connect(self, start: Array, end: Array) -> Edge:
         """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.
@@ -229,7 +240,8 @@ class Planner:
         origin = int(start.nodes[0]) * self._phases if start.nodes.size else states
         if start.legs is not None:
             rows, to = start.legs.outcomes, start.legs.nodes
-            own, climbs, last = blend.of(rows[:, 2], rows[:, 1]), rows[:, 3] > 0, last + to.size
+            own, climbs = blend.of(rows[:, COST], rows[:, TIME]), rows[:, GLIDE_ANGLE] > 0
+            last += to.size
             pump = self.problem.evaluator.cost.inflection(start.point[2])
             if turn is not None and pump is not None:
                 own, to = own + blend.cost * np.where(climbs, pump, 0.0), 2 * to + climbs
@@ -247,7 +259,7 @@ class Planner:
         found = self.problem.evaluator.connect(points, self.problem.departure, *rows)
         legs = [NOTHING] * len(goals)
         for n, row in zip(asked, found, strict=True):
-            legs[n] = _edge(row)
+            legs[n] = edge_of(row)
         return legs
 
     def _way(self, search: _Search, goal: End, direct: Edge) -> Path:
@@ -279,14 +291,14 @@ class Planner:
         costs = search.cost[states]
         if goal.legs is not None:
             rows = np.repeat(goal.legs.outcomes, phases, axis=0)
-            costs = costs + search.blend.of(rows[:, 2], rows[:, 1])
+            costs = costs + search.blend.of(rows[:, COST], rows[:, TIME])
             if self._turns is not None:
-                turn = (rows[:, 3] > 0) & (states % 2 == 0)
+                turn = (rows[:, GLIDE_ANGLE] > 0) & (states % 2 == 0)
                 costs = costs + search.blend.cost * np.where(turn, self._turns[states // 2], 0.0)
         if not costs.size or not math.isfinite(costs.min()):
             return math.inf, 0, None
         best = int(np.argmin(costs))
-        leg = None if goal.legs is None else _edge(goal.legs.outcomes[best // phases])
+        leg = None if goal.legs is None else edge_of(goal.legs.outcomes[best // phases])
         return float(costs[best]), int(states[best]), leg
 
     def _where(self, search: _Search, state: int) -> Array:
@@ -297,7 +309,7 @@ class Planner:
         source, target = earlier // self._phases, later // self._phases
         if source == len(self.roadmap.position):
             assert search.start.legs is not None
-            return _edge(search.start.legs.outcomes[np.flatnonzero(search.start.legs.nodes == target)[0]])
+            return edge_of(search.start.legs.outcomes[np.flatnonzero(search.start.legs.nodes == target)[0]])
         row = slice(self.roadmap.indptr[source], self.roadmap.indptr[source + 1])
         n = int(self.roadmap.indptr[source] + np.flatnonzero(self.roadmap.target[row] == target)[0])
         return Edge(int(Status.CONNECTED), *(float(getattr(self.roadmap, name)[n]) for name in EDGE_FIELDS))
@@ -336,9 +348,5 @@ class Planner:
 
 
 def _connected(attached: Attached) -> Attached:
-    kept = attached.outcomes[:, 0] == Status.CONNECTED
+    kept = attached.outcomes[:, STATUS] == Status.CONNECTED
     return Attached(attached.nodes[kept], attached.outcomes[kept])
-
-
-def _edge(row: Array) -> Edge:
-    return Edge(int(row[0]), *(float(value) for value in row[1:]))

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Array, Index
 from ..base.settings import require
-from ..kernels.edges import Status
+from ..kernels.edges import GLIDE_ANGLE, STATUS, TIME, Status
 from ..roadmap.pairs import Attached, Legs
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
@@ -96,16 +96,20 @@ class SurfacingPlanner(Planner):
         )
         return nodes, place
 
+    def _reached(self, start: Array) -> tuple[Array, Array]:
+        """As Planner; a node is reached in whichever of its states is reached first."""
+        return self.base.position, self.arrivals(start).reshape(-1, len(self.base.position)).min(axis=0)
+
     def _on_base(self) -> Legs:
         return self.problem.legs(self.base.position)
 
 
 def _onward(rule: Surfacing, position: Array, used: Index, nodes: Index, outcomes: Array) -> tuple[Index, Index]:
     """Of legs to `nodes`, from a state `used` (2,): the states that they end in, and which keep the rule."""
-    turns, parts = rule.steps(int(used[0]), outcomes[:, 3], outcomes[:, 1])
+    turns, parts = rule.steps(int(used[0]), outcomes[:, GLIDE_ANGLE], outcomes[:, TIME])
     after = np.stack([used[0] + turns, used[1] + parts])
     counts = np.array(rule.counts)
-    fits = (outcomes[:, 0] == Status.CONNECTED) & (after < counts[:, None]).all(axis=0)
+    fits = (outcomes[:, STATUS] == Status.CONNECTED) & (after < counts[:, None]).all(axis=0)
     up = position[nodes, 2] >= -SURFACE
     half, part = np.where(up, 0, after)[:, fits]
     return (half * counts[1] + part) * len(position) + nodes[fits], np.flatnonzero(fits)

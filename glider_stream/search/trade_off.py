@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from ..base.clock import span
 from ..base.settings import require
 from .path import Path
 from .query import Blend
@@ -40,9 +41,9 @@ class TradeOff:
         return {"trade_off": [{"travel_time_s": t, "energy_j": e, "legs": n} for t, e, n in rows]}
 
     def __str__(self) -> str:
-        lines = ["   time       energy   legs"]
+        lines = ["   time                energy   legs"]
         lines += [
-            f"{path.travel_time:9,.0f} s {path.cost / 1000:9,.2f} kJ  {len(path.legs):4}" for path in self.paths
+            f"{span(path.travel_time):>20} {path.cost / 1000:9,.2f} kJ  {len(path.legs):4}" for path in self.paths
         ]
         return "\n".join(
             [*lines, "the corners of the hull: between two, others may lie that no price makes best"]

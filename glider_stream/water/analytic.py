@@ -40,7 +40,7 @@ class AnalyticFlow:
         """Check the flow's own values."""
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """The kernel's class, and its fields that are not at their usual values; `depth` [m] of interest."""
+        """The kernel's class, its fields, and what of its extent is not as usual; `depth` [m] of interest."""
         raise NotImplementedError
 
     def kernel(self, z: Range) -> kernel.Flow:
@@ -48,7 +48,9 @@ class AnalyticFlow:
         kind, values = self.fields((-z[1], -z[0]))
         (x_lo, x_hi), (y_lo, y_hi) = self.x or ALWAYS, self.y or ALWAYS
         usual = {"x_lo": x_lo, "x_hi": x_hi, "y_lo": y_lo, "y_hi": y_hi, "t_lo": -math.inf, "t_hi": math.inf}
-        result: kernel.Flow = kind(**usual | values)
+        values = usual | values
+        known = kernel.Extent(**{name: values.pop(name) for name in kernel.Extent._fields})
+        result: kernel.Flow = kind(**values, extent=known)
         return result
 
 

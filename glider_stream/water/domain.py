@@ -17,6 +17,14 @@ if TYPE_CHECKING:
 Point = tuple[float, float, float]
 
 
+ROUNDED = 1e-9
+"""By how much a place [degrees] is off after the frame's metres and back."""
+
+
+def _within(value: float, bounds: Range) -> bool:
+    return bounds[0] <= value <= bounds[1]
+
+
 @dataclass(frozen=True)
 class BoxDomain:
     """x, y, z [lo, hi] in metres; z upward, the surface at 0."""
@@ -42,6 +50,19 @@ class BoxDomain:
     def point(self, values: Point) -> Array:
         """A point of this domain's coordinates, x, y, z, in the local frame (3,) [m]."""
         return np.array(values)
+
+    def outside(self, x: float, y: float) -> str:
+        """That a place x, y [m] lies outside, and whether it would inside with both swapped; empty if inside."""
+        if _within(x, self.x) and _within(y, self.y):
+            return ""
+        bounds = f"x from {self.x[0]:g} to {self.x[1]:g} m and y from {self.y[0]:g} to {self.y[1]:g} m"
+        swapped = _within(y, self.x) and _within(x, self.y)
+        cure = (
+            "with x and y swapped it would lie inside: give X,Y,Z"
+            if swapped
+            else "move it inside, or widen [domain]"
+        )
+        return f"outside the domain, {bounds}; {cure}"
 
 
 @dataclass(frozen=True)
@@ -91,10 +112,29 @@ class GeographicDomain:
         """A point of this domain's coordinates, lon, lat, depth, in the local frame (3,) [m]."""
         lon, lat, depth = values
         on_earth = abs(lat) < 90 and abs(lon) <= 360
-        require(on_earth, f"{lon:g}, {lat:g} is no longitude and latitude in degrees; give LON,LAT,DEPTH")
+        swapped = abs(lon) < 90 and abs(lat) <= 360 and self._holds(lat, lon)
+        hint = "; with longitude and latitude swapped it would lie inside the domain" if swapped else ""
+        cure = f"give LON,LAT,DEPTH{hint}"
+        require(on_earth, f"{lon:g}, {lat:g} is no longitude and latitude in degrees; {cure}")
         require(0 <= depth < math.inf, f"the depth must be at least 0 m, downward; got {depth:g}")
         x, y = self.frame().to_local(np.array([lon]), np.array([lat]))
         return np.array([x[0], y[0], 0.0 - depth])
+
+    def _holds(self, lon: float, lat: float) -> bool:
+        """Whether a place in degrees lies in it."""
+        east = (lon - self.lon[0] + ROUNDED) % 360
+        return east <= self.width + 2 * ROUNDED and self.lat[0] - ROUNDED <= lat <= self.lat[1] + ROUNDED
+
+    def outside(self, lon: float, lat: float) -> str:
+        """That a place in degrees lies outside, and whether it would not, were they swapped; empty if inside."""
+        if self._holds(lon, lat):
+            return ""
+        (west, east), (south, north) = self.lon, self.lat
+        bounds = f"longitude {west:g} to {east:g} and latitude {south:g} to {north:g} degrees"
+        cure = "move it inside, or widen [domain]"
+        if self._holds(lat, lon):
+            cure = "with longitude and latitude swapped it would lie inside: give LON,LAT,DEPTH"
+        return f"outside the domain, {bounds}; {cure}"
 
 
 def domain_from_table(table: Mapping[str, Any]) -> BoxDomain | GeographicDomain:

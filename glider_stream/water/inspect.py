@@ -14,13 +14,13 @@ def is_steady(flow: kernel.Flow) -> bool:
     """Whether the flow is the same at all times."""
     if isinstance(flow, kernel.Gyre):
         return flow.epsilon == 0
-    return math.isinf(flow.t_lo)
+    return math.isinf(flow.extent.t_lo)
 
 
 def flow_sha256(flow: kernel.Flow | Terrain) -> str:
     """A digest of everything the kernels can read of a flow, or of a terrain."""
     text = hashlib.sha256(type(flow).__name__.encode())
-    for name, value in zip(flow._fields, flow, strict=True):
+    for name, value in kernel.fields_of(flow).items():
         array = np.ascontiguousarray(value)
         text.update(f"\n{name} {array.dtype} {array.shape}\n".encode() + array.tobytes())
     return text.hexdigest()
@@ -31,7 +31,7 @@ def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float =
 
     0 where the flow has neither; inf where it only diverges.
     """
-    step = 1e-3 * min(flow.length_scale, x[1] - x[0], y[1] - y[0])
+    step = 1e-3 * min(flow.extent.length_scale, x[1] - x[0], y[1] - y[0])
     share = np.random.default_rng(0).random((3, count))
     lo = np.array([x[0] + step, y[0] + step, z[0]])
     hi = np.array([x[1] - step, y[1] - step, z[1]])

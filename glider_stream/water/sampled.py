@@ -23,7 +23,8 @@ def sample_flow(
 ) -> kernel.Grid:
     """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
     require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
-    box = [(max(x[0], flow.x_lo), min(x[1], flow.x_hi)), (max(y[0], flow.y_lo), min(y[1], flow.y_hi)), z]
+    known = flow.extent
+    box = [(max(x[0], known.x_lo), min(x[1], known.x_hi)), (max(y[0], known.y_lo), min(y[1], known.y_hi)), z]
     points = [(float(hi) - float(lo)) / step + 1 for (lo, hi), step in zip(box, spacing, strict=True)]
     require(
         math.prod(points) <= MAX_SAMPLES,
@@ -35,6 +36,7 @@ def sample_flow(
     values = np.empty((counts[2], counts[0], counts[1], 2))
     in_parallel(partial(kernel.sample_lines, flow, *lines, 0.0, values), counts[2] * counts[0], LINES_AT_ONCE)
     steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
+    scale = known.length_scale
     level_speed = np.array([np.hypot(level[..., 0], level[..., 1]).max() for level in values])
     return kernel.Grid(
         values=values,
@@ -44,16 +46,14 @@ def sample_flow(
         per_y=1 / steps[1],
         z_first=z[0],
         per_z=1 / steps[2],
-        x_lo=box[0][0],
-        x_hi=box[0][1],
-        y_lo=box[1][0],
-        y_hi=box[1][1],
-        t_lo=flow.t_lo,
-        t_hi=flow.t_hi,
-        max_speed=float(level_speed.max()),
-        length_scale=max(flow.length_scale / 2, steps[0], steps[1])
-        if math.isfinite(flow.length_scale)
-        else steps[0],
+        extent=kernel.Extent(
+            *box[0],
+            *box[1],
+            known.t_lo,
+            known.t_hi,
+            max_speed=float(level_speed.max()),
+            length_scale=max(scale / 2, steps[0], steps[1]) if math.isfinite(scale) else steps[0],
+        ),
     )
 
 

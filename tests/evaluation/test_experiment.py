@@ -61,6 +61,6 @@ def test_the_interval_is_that_of_the_mean():
 def test_random_fields_are_as_fast_as_the_seed_box_and_differ():
     import experiment
 
-    speeds = [experiment.problem_of(seed, [3, 3, 2]).evaluator.flow.max_speed for seed in range(3)]
+    speeds = [experiment.problem_of(seed, [3, 3, 2]).evaluator.flow.extent.max_speed for seed in range(3)]
     assert experiment.random_vortices(0) != experiment.random_vortices(1)
     assert speeds == pytest.approx([experiment.FASTEST] * 3, rel=1e-6)

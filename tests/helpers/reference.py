@@ -9,8 +9,9 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 from glider_stream.kernels.cache import entry_point
-from glider_stream.kernels.control import CLIMB, DIVE, candidate_controls, control_towards, vertical_speed
+from glider_stream.kernels.control import candidate_controls, control_towards, direction_of, vertical_speed
 from glider_stream.kernels.flow import contains, velocity
+from glider_stream.kernels.place import Pair, Place
 
 CONNECTED, TIME, COST, ANGLE, HEADING, SPEED, MISS = range(7)
 
@@ -32,13 +33,12 @@ def literal_edges(flow, polar, steering, integration, position, departure, sourc
         edges[pair, 0] = 0.0
         if z_p == z_q or not (contains(flow, x_p, y_p, t) and contains(flow, x_q, y_q, t)):
             continue
-        direction = CLIMB if z_q > z_p else DIVE
+        pair_ends = Pair(Place(x_p, y_p, z_p, t), Place(x_q, y_q, z_q, t))
+        direction = direction_of(pair_ends)
         slowest = abs(z_q - z_p) / horizon
         if vertical_speed(polar, direction, polar.steepest[direction]) < slowest:
             continue
-        count = candidate_controls(
-            steering, flow, polar, direction, x_p, y_p, z_p, x_q, y_q, z_q, t, slowest, controls
-        )
+        count = candidate_controls(steering, flow, polar, pair_ends, slowest, controls)
         cheapest = math.inf
         for n in range(count):
             c = control_towards(polar, direction, controls[n, 0], controls[n, 1])
@@ -68,10 +68,15 @@ def literal_edges(flow, polar, steering, integration, position, departure, sourc
                 if off < miss:
                     miss, time = off, (step + share) * dt
                 x, y, z = x_next, y_next, z_next
-            if miss < integration.tolerance and time < cheapest:
+            if miss < integration.tolerance and 0.0 < time < cheapest:
                 cheapest = time
                 edges[pair] = (1.0, time, time, c.glide_angle, c.heading, c.speed, miss)
     return edges
+
+
+def pair_of(p, q, t=0.0):
+    """The pair of two points (3,) [m], left at t [s]."""
+    return Pair(Place(*p, t), Place(*q, t))
 
 
 def stream_value(flow, p, q, t=0.0):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.reference import pair_of
 
 from glider_stream.kernels.control import (
     CLIMB,
@@ -16,32 +17,36 @@ from glider_stream.kernels.control import (
     candidate_controls,
     control_plane,
     control_towards,
+    direction_of,
     heading_on_line,
     horizontal_speed,
     vertical_speed,
 )
 from glider_stream.kernels.flow import mean_velocity
+from glider_stream.kernels.place import Pair
 from glider_stream.water.analytic import Uniform
 
 SLOWEST = 0.1
 
 
 def pairs(count, seed, reach=250.0):
-    """Pairs (x_p, y_p, z_p, x_q, y_q, z_q), dives and climbs."""
+    """Pairs of places, dives and climbs."""
     rng = np.random.default_rng(seed)
     lo, hi = np.array([-reach, -reach, -250.0]), np.array([reach, reach, 0.0])
-    return [tuple(np.concatenate(lo + (hi - lo) * pair)) for pair in rng.random((count, 2, 3))]
-
-
-def direction_of(pair):
-    return CLIMB if pair[5] > pair[2] else DIVE
+    return [pair_of(*(lo + (hi - lo) * pair)) for pair in rng.random((count, 2, 3))]
 
 
 def candidates(steering, flow, polar, pair, slowest=SLOWEST):
     """Rows (angle's magnitude, heading), or the code where there are none."""
     controls = np.full((steering.candidates, 2), np.nan)
-    count = candidate_controls(steering, flow, polar, direction_of(pair), *pair, 0.0, slowest, controls)
+    count = candidate_controls(steering, flow, polar, pair, slowest, controls)
     return count if count < 1 else controls[:count]
+
+
+def faster(vortices, times):
+    """Vortices so many times as fast."""
+    extent = vortices.extent._replace(max_speed=times * vortices.extent.max_speed)
+    return vortices._replace(speed=times * vortices.speed, extent=extent)
 
 
 def off_plane(plane, u, v):
@@ -53,8 +58,8 @@ def off_plane(plane, u, v):
 
 
 def test_plane_is_that_of_the_pair(vortices):
-    pair = (-90.0, 40.0, -20.0, 60.0, 100.0, -120.0)
-    plane = control_plane(vortices, *pair, 0.0)
+    pair = pair_of((-90.0, 40.0, -20.0), (60.0, 100.0, -120.0))
+    plane = control_plane(vortices, pair)
     assert (plane.a, plane.b) == (60.0, -150.0)
     assert plane.lowest == abs(plane.c) / math.hypot(60.0, 150.0)
 
@@ -62,8 +67,8 @@ def test_plane_is_that_of_the_pair(vortices):
 def test_plane_holds_the_velocities_that_cancel_the_mean_flow_across_the_line(vortices):
     # a velocity that cancels a uniform cross flow: psi_c + (u dy - v dx) = 0
     for pair in pairs(50, seed=0):
-        plane = control_plane(vortices, *pair, 0.0)
-        back = control_plane(vortices, *pair[3:], *pair[:3], 0.0)
+        plane = control_plane(vortices, pair)
+        back = control_plane(vortices, Pair(pair.goal, pair.start))
         np.testing.assert_allclose(
             [back.a, back.b, back.c], [-plane.a, -plane.b, -plane.c], rtol=1e-12, atol=1e-9
         )
@@ -73,7 +78,7 @@ def test_plane_holds_the_velocities_that_cancel_the_mean_flow_across_the_line(vo
 def test_every_control_on_the_line_is_on_the_plane_and_on_the_circle(vortices, glide):
     seen = 0
     for pair in pairs(300, seed=1):
-        plane = control_plane(vortices, *pair, 0.0)
+        plane = control_plane(vortices, pair)
         for angle in np.linspace(glide.shallowest[0], glide.steepest[0], 7):
             horizontal = horizontal_speed(glide, direction_of(pair), angle)
             if horizontal <= plane.lowest * (1 + 1e-9):
@@ -91,7 +96,7 @@ def test_every_control_on_the_line_is_on_the_plane_and_on_the_circle(vortices, g
 def test_the_papers_printed_signs_leave_the_plane(vortices, glide):
     off = []
     for pair in pairs(100, seed=2):
-        plane = control_plane(vortices, *pair, 0.0)
+        plane = control_plane(vortices, pair)
         r, vh = plane.a**2 + plane.b**2, glide.best_horizontal[0]
         if plane.lowest > 0.9 * vh:
             continue
@@ -115,8 +120,8 @@ def test_straight_above_the_control_cancels_the_mean_flow(planar, vortices, glid
     cancelled = 0
     for flow in (vortices, planar):
         for x in np.linspace(-200.0, 200.0, 161):
-            pair = (x, 40.0, 0.0, x, 40.0, -100.0)
-            plane = control_plane(flow, *pair, 0.0)
+            pair = pair_of((x, 40.0, 0.0), (x, 40.0, -100.0))
+            plane = control_plane(flow, pair)
             mean = mean_velocity(flow, x, 40.0, 0.0, -100.0, 0.0)
             assert (plane.a, plane.b, plane.c) == (0.0, 0.0, 0.0)
             assert (-plane.u, -plane.v) == mean
@@ -140,10 +145,10 @@ def test_lowest_speed_test_is_the_brute_force_over_glide_angle_and_heading(vorti
     angles = np.linspace(glide.shallowest[0], glide.steepest[0], 200)
     headings = np.linspace(-math.pi, math.pi, 721)
     verdicts = []
-    strong = vortices._replace(speed=2.5 * vortices.speed, max_speed=2.5 * vortices.max_speed)
+    strong = faster(vortices, 2.5)
     for pair in pairs(300, seed=3):
         direction = direction_of(pair)
-        plane = control_plane(strong, *pair, 0.0)
+        plane = control_plane(strong, pair)
         if abs(plane.lowest / glide.best_horizontal[direction] - 1) < 1e-3:
             continue
         along = np.array([horizontal_speed(glide, direction, angle) for angle in angles])[:, None]
@@ -168,7 +173,7 @@ def test_line_candidates_are_counted_even_in_angle_and_on_the_plane(vortices, gl
             continue
         seen += 1
         assert len(found) == count
-        plane, direction = control_plane(vortices, *pair, 0.0), direction_of(pair)
+        plane, direction = control_plane(vortices, pair), direction_of(pair)
         for angle, heading in found:
             control = control_towards(glide, direction, angle, heading)
             assert off_plane(plane, control.u, control.v) < 1e-7  # S loses half its digits where it vanishes
@@ -187,7 +192,7 @@ def test_line_candidates_span_the_whole_feasible_range(vortices, glide):
         found = candidates(Streamline(100), vortices, glide, pair)
         if isinstance(found, int):
             continue
-        direction, lowest = direction_of(pair), control_plane(vortices, *pair, 0.0).lowest
+        direction, lowest = direction_of(pair), control_plane(vortices, pair).lowest
         angles = np.linspace(glide.shallowest[0], glide.steepest[0], 4001)
         able = [
             horizontal_speed(glide, direction, angle) >= lowest
@@ -203,7 +208,7 @@ def test_no_candidate_where_the_depth_cannot_be_reached(glide):
     # the plane asks for more than the horizontal speed of the steepest glide
     lowest = 0.5 * (horizontal_speed(glide, DIVE, glide.steepest[0]) + glide.best_horizontal[DIVE])
     flow = Uniform(0.0, lowest).kernel((-250.0, 0.0))
-    pair = (0.0, 0.0, 0.0, 100.0, 0.0, -100.0)
+    pair = pair_of((0.0, 0.0, 0.0), (100.0, 0.0, -100.0))
     steep = angle_of_horizontal_speed(glide, DIVE, lowest, glide.steepest[0])
     fastest = vertical_speed(glide, DIVE, steep)
     assert steep < glide.steepest[DIVE]
@@ -213,7 +218,7 @@ def test_no_candidate_where_the_depth_cannot_be_reached(glide):
 
 @pytest.mark.parametrize("count", [16, 54, 100, 400])
 def test_surface_candidates_are_even_in_both(vortices, glide, count):
-    found = candidates(Surface(count), vortices, glide, (0.0, 0.0, 0.0, 50.0, 60.0, -100.0))
+    found = candidates(Surface(count), vortices, glide, pair_of((0.0, 0.0, 0.0), (50.0, 60.0, -100.0)))
     assert len(found) == count
     angle = (found[:, 0] - glide.shallowest[0]) / (glide.steepest[0] - glide.shallowest[0])
     turn = (found[:, 1] + math.pi) / (2 * math.pi)
@@ -225,8 +230,8 @@ def test_surface_candidates_are_even_in_both(vortices, glide, count):
 
 
 def test_surface_candidates_do_not_depend_on_the_pair(vortices, planar, glide):
-    first = candidates(Surface(20), vortices, glide, (0.0, 0.0, 0.0, 50.0, 60.0, -100.0))
-    other = candidates(Surface(20), planar, glide, (9.0, 5.0, -10.0, -50.0, 60.0, -60.0), slowest=0.0)
+    first = candidates(Surface(20), vortices, glide, pair_of((0.0, 0.0, 0.0), (50.0, 60.0, -100.0)))
+    other = candidates(Surface(20), planar, glide, pair_of((9.0, 5.0, -10.0), (-50.0, 60.0, -60.0)), slowest=0.0)
     assert (first == other).all()
 
 

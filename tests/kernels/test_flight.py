@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from glider_stream.kernels.cache import entry_point
-from glider_stream.kernels.flight import FLIGHT_ROWS, LEFT, advance, fly_for, hangar, place
+from glider_stream.kernels.flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_for, hangar, place
 from glider_stream.kernels.interpolate import pair_between
-from glider_stream.kernels.motion import LANES, X, Y, traced
+from glider_stream.kernels.motion import LANE_X, LANE_Y, LANES, traced
+from glider_stream.kernels.place import Place, Velocity
 
 
 @entry_point()
@@ -17,13 +18,13 @@ def landings(flow, starts, through, durations, t, dt):
     for n in range(len(starts)):
         x, y, z = starts[n]
         u, v, w = through[n]
-        place(lanes, n, x, y, z, t, u, v, w)
+        place(lanes, n, Place(x, y, z, t), Velocity(u, v, w))
         fly_for(lanes, n, durations[n], dt)
     for _ in range(1000):
         advance(flow, lanes)
         for n in range(len(starts)):
-            if lanes[LEFT, n] == 0.0:
-                landed[n] = lanes[X, n], lanes[Y, n]
+            if lanes[LANE_LEFT, n] == 0.0:
+                landed[n] = lanes[LANE_X, n], lanes[LANE_Y, n]
     return landed
 
 
@@ -40,7 +41,7 @@ def test_a_flight_ends_where_its_trace_does(vortices):
     starts, through, durations = flights(LANES)
     landed = landings(vortices, starts, through, durations, 0.0, 5.0)
     for n in range(LANES):
-        alone = traced(vortices, *starts[n], 0.0, *through[n], durations[n], 5.0)[-1, 1:3]
+        alone = traced(vortices, Place(*starts[n], 0.0), Velocity(*through[n]), durations[n], 5.0)[-1, 1:3]
         np.testing.assert_allclose(landed[n], alone, rtol=0, atol=1e-9)
 
 

@@ -24,7 +24,7 @@ def psi(flow, x, y):
 
 def test_antisymmetric(vortices):
     for p, q in pairs(200, seed=0):
-        there, back = stream_value(vortices, *p, *q, 0.0), stream_value(vortices, *q, *p, 0.0)
+        there, back = (stream_value(vortices, reference.pair_of(*ends)) for ends in ((p, q), (q, p)))
         assert there == pytest.approx(-back, rel=1e-12, abs=1e-12)
         assert there != 0
 
@@ -32,20 +32,20 @@ def test_antisymmetric(vortices):
 def test_zero_around_a_triangle_in_the_plane(planar):
     for p, q in pairs(100, seed=1):
         r = (q[1] / 2, -p[0], -70.0)
-        sides = [stream_value(planar, *a, *b, 0.0) for a, b in ((p, q), (q, r), (r, p))]
+        sides = [stream_value(planar, reference.pair_of(a, b, 0.0)) for a, b in ((p, q), (q, r), (r, p))]
         assert abs(sum(sides)) < 1e-6 * max(map(abs, sides))
 
 
 def test_difference_of_the_stream_function_in_the_plane(planar):
     for p, q in pairs(200, seed=2):
         expected = psi(planar, *q[:2]) - psi(planar, *p[:2])
-        assert stream_value(planar, *p, *q, 0.0) == pytest.approx(expected, rel=1e-6, abs=1e-7)
+        assert stream_value(planar, reference.pair_of(p, q, 0.0)) == pytest.approx(expected, rel=1e-6, abs=1e-7)
 
 
 def test_depends_on_the_depths_where_the_flow_does(vortices, planar):
     (x, y, _), (x_q, y_q, _) = (-100.0, 30.0, 0.0), (80.0, 120.0, 0.0)
-    same = [stream_value(planar, x, y, z, x_q, y_q, -100.0, 0.0) for z in (0.0, -200.0)]
-    other = [stream_value(vortices, x, y, z, x_q, y_q, -100.0, 0.0) for z in (0.0, -200.0)]
+    same = [stream_value(planar, reference.pair_of((x, y, z), (x_q, y_q, -100.0))) for z in (0.0, -200.0)]
+    other = [stream_value(vortices, reference.pair_of((x, y, z), (x_q, y_q, -100.0))) for z in (0.0, -200.0)]
     assert same[0] == same[1]
     assert abs(other[0] - other[1]) > 1.0
 
@@ -54,23 +54,23 @@ def test_closed_form_in_uniform_flow():
     flow = Uniform(0.7, -0.4).kernel((-250.0, 0.0))
     for p, q in pairs(100, seed=3):
         expected = 0.7 * (q[1] - p[1]) + 0.4 * (q[0] - p[0])
-        assert stream_value(flow, *p, *q, 0.0) == pytest.approx(expected, rel=1e-13, abs=1e-12)
+        assert stream_value(flow, reference.pair_of(p, q, 0.0)) == pytest.approx(expected, rel=1e-13, abs=1e-12)
 
 
 def test_is_the_adaptive_quadrature(vortices):
     for p, q in pairs(30, seed=4):
-        assert stream_value(vortices, *p, *q, 0.0) == pytest.approx(
+        assert stream_value(vortices, reference.pair_of(p, q, 0.0)) == pytest.approx(
             reference.stream_value(vortices, p, q), rel=1e-6, abs=1e-7
         )
 
 
 def test_follows_the_time_of_departure(gyre):
     p, q = (-200.0, 30.0, -10.0), (150.0, 120.0, -90.0)
-    values = [stream_value(gyre, *p, *q, t) for t in (0.0, 175.0, 525.0)]
+    values = [stream_value(gyre, reference.pair_of(p, q, t)) for t in (0.0, 175.0, 525.0)]
     expected = [reference.stream_value(gyre, p, q, t) for t in (0.0, 175.0, 525.0)]
     np.testing.assert_allclose(values, expected, rtol=1e-6)
     assert np.ptp(values) > 5.0
 
 
 def test_nothing_crosses_a_pair_that_is_a_point(vortices):
-    assert stream_value(vortices, 10.0, 20.0, -50.0, 10.0, 20.0, -150.0, 0.0) == 0.0
+    assert stream_value(vortices, reference.pair_of((10.0, 20.0, -50.0), (10.0, 20.0, -150.0))) == 0.0

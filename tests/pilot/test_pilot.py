@@ -218,8 +218,8 @@ def test_exports_in_others_readers(tmp_path, frame):
     check([shapes[0].coords[0], shapes[0].coords[-1]], [STOPS[0], STOPS[-1]])
     parsed = gpxpy.parse((tmp_path / "route.gpx").read_text())
     [own] = parsed.routes
-    check([(one.longitude, one.latitude, one.elevation) for one in own.points], ends)
-    assert [one.time for one in own.points] == [DEPARTS + timedelta(seconds=1000 * n) for n in (1, 2, 3)]
+    check([(one.longitude, one.latitude, one.elevation) for one in own.points], STOPS)
+    assert [one.time for one in own.points] == [DEPARTS + timedelta(seconds=1000 * n) for n in range(4)]
     assert len(parsed.tracks[0].segments[0].points) == 13
     document = kml.KML.parse(tmp_path / "route.kml").features[0]
     marks = [mark for mark in document.features if mark.geometry.geom_type == "Point"]

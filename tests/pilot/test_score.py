@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glider_stream import planner
+from glider_stream.base.clock import span
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.pilot.export import export_path
@@ -44,6 +45,7 @@ LINE = {"type": "LineString", "coordinates": [[18.4, 38.0], [18.5, 38.1, -200], 
 MARKS = [{"type": "Feature", "geometry": {"type": "Point", "coordinates": [18.4, n]}} for n in (37, 38)]
 READ = ((18.4, 38.0, 0.0), (18.5, 38.1, 200.0), (18.6, 38.0, 0.0))
 CORNERS = "18.4,38,0 18.5,38.1,-200\n 18.6,38"
+ABSOLUTE = "<altitudeMode>absolute</altitudeMode>"
 KML = '<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{}</Document></kml>'
 GPX = '<gpx xmlns="http://www.topografix.com/GPX/1/1">{}</gpx>'
 PLACES = '<{0} lon="18.4" lat="38"/><{0} lon="18.5" lat="38.1"><ele>-200</ele></{0}><{0} lon="18.6" lat="38"/>'
@@ -57,11 +59,14 @@ OTHERS = {
     "semicolons.csv": "\ufeffName;LON;Lat;Depth\r\na;18.4;38;0\r\nb;18.5;38.1;200\r\nc;18.6;38;0\r\n",
     "tabs.csv": "longitude\tlatitude\tdepth_m\n18.4\t38\t0\n18.5\t38.1\t200\n18.6\t38\t0\n",
     "line.kml": KML.format(
-        f"<Placemark><LineString><coordinates>{CORNERS}</coordinates></LineString></Placemark>"
+        f"<Placemark><LineString>{ABSOLUTE}<coordinates>{CORNERS}</coordinates></LineString></Placemark>"
         "<Placemark><Point><coordinates>1,2</coordinates></Point></Placemark>"
     ),
     "points.kml": KML.format(
-        "".join(f"<Placemark><Point><coordinates>{p}</coordinates></Point></Placemark>" for p in CORNERS.split())
+        "".join(
+            f"<Placemark><Point>{ABSOLUTE}<coordinates>{p}</coordinates></Point></Placemark>"
+            for p in CORNERS.split()
+        )
     ),
     "route.gpx": GPX.format(f"<rte>{PLACES.format('rtept')}</rte>" + '<wpt lon="1" lat="2"/>'),
     "track.gpx": GPX.format(f"<trk><trkseg>{PLACES.format('trkpt')}</trkseg></trk>"),
@@ -98,14 +103,14 @@ BROKEN = [
     ("a.geojson", '{"type": "Feature", "geometry": null}', "from 2 to 10,000 points; got 0"),
     ("a.geojson", json.dumps({"type": "FeatureCollection", "features": 2 * [LINE]}), "holds 2 lines"),
     ("a.csv", "lon,lat\n" + "1" * 200_000 + ",2\n1,2\n", "field larger than field limit"),
-    ("a.csv", "lon,lat,depth\n1,2,\n1,2,3\n", r"point 1 .* got \('1', '2', ''\)"),
+    ("a.csv", "lon,lat,depth\n1,2,\n1,2,3\n", r"point 1 .* got \(1.0, 2.0, ''\)"),
     ("a.csv", "lon,lat\n1\n1,2\n", "point 1"),
     ("a.csv", "\x00", "columns are none"),
     ("a.csv", "name,lat,lon,eta,depth_min,depth_max\nWP001,1,2,3,0,50\nWP002,1,2,3,0,50\n", "how deep legs end"),
     ("a.csv", "lon,lat\n" + 10_001 * "1,2\n", "from 2 to 10,000 points; got 10001"),
     ("a.csv", "x" * (MOST_TEXT + 1), "more than the 20,000,000 bytes"),
     ("a.gpx", "<gpx><rte><rtept lat='1'/></rte></gpx>", "is not built as one is"),
-    ("a.gpx", "<gpx creator='glider-stream'/>", "is not built as one is"),
+    ("a.gpx", "<gpx creator='glider-stream'/>", "no route point"),
     ("a.gpx", "<a>" * 100_000 + "</a>" * 100_000, "no route point"),
     ("a.kml", "<kml/>", "no line and no points"),
     ("a.kml", "<kml><Point><coordinates>1,2,</coordinates></Point></kml>", "could not convert"),
@@ -148,7 +153,7 @@ def test_damage_is_read_or_refused(tmp_path, which, cut, put):
     (tmp_path / name).write_bytes(damaged.encode("utf-8", "surrogatepass"))
     with contextlib.suppress(InputError):
         assert len(read_drawn(tmp_path / name).places) >= 2
-    assert set(FORMS) == {".csv", ".geojson", ".json", ".kml", ".gpx"}
+    assert set(FORMS) == {".csv", ".geojson", ".json", ".kml", ".gpx", ".ma", "targets"}
 
 
 # flying them
@@ -176,7 +181,7 @@ def test_points_of_one_depth_are_joined_by_the_roadmap_and_said_to_be(file, sear
     way = search.query((-100.0, 100.0, -75.0), (0.0, 0.0, -75.0))
     assert said.code == 0
     count = len(way.legs)
-    words = f"leg 2: {way.travel_time:,.0f} s, {count} glides of the roadmap: one glide changes depth"
+    words = f"leg 2: {span(way.travel_time)}, {count} glides of the roadmap: one glide changes depth"
     assert words in said.out
     assert said.out.count("compass") == 1 + count
     table = strict_json(command(capsys, "score", file, tmp_path / "flat.csv", "--json").out)

@@ -181,7 +181,7 @@ def test_a_profile_shows_the_seabed_where_it_is_near():
         assert said in ax.get_title("left")
         fills = [one for one in ax.collections if type(one).__name__ == "FillBetweenPolyCollection"]
         assert bool(fills) == ground
-        assert figure._suptitle.get_text().endswith("departs 2024-11-20 18:00 UTC")
+        assert figure._suptitle.get_text().endswith("departs 2024-11-20 18:00 UTC, arrives 2024-11-21 14:00 UTC")
 
 
 def test_a_chart_without_a_leg_or_at_two_depths_is_refused():

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from datetime import timedelta
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
@@ -272,7 +273,8 @@ def test_pointers_choose_legs_and_move_the_map(browsed):
     assert facts["Glide angle"] == f"{np.degrees(leg.glide_angle):.1f}°"
     assert facts["Depths"] == f"{-leg.start[2]:.0f} to {-leg.end[2]:.0f} m"
     assert facts["Takes"] == f"{leg.duration / 3600:.2f} h"
-    assert facts["Departs"] == f"{leg.depart / 3600:.2f} h"
+    leaves = ocean_scene().problem.departs + timedelta(seconds=leg.depart)
+    assert facts["Departs"] == f"{leaves:%Y-%m-%d %H:%M} UTC"
     text, x, y = said["readout"]
     assert degrees(text) == pytest.approx([y / 1e5 + 38.0, x / 1e5 - 18.5], abs=2e-4)
     assert [row.partition(":")[0] for row in said["rows"]] == [f"Leg {n} of 8" for n in range(1, 9)]

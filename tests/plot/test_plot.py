@@ -140,7 +140,8 @@ def test_panels_and_their_units_fit_the_scale(figures):
     box, ocean = figures["route in a box"], figures["route in the ocean"]
     current = [title for title in titles(box) if "Current" in title]
     assert current == ["(b) Current at 0 m", *(f"Current at {depth} m" for depth in (100, 200, 300))]
-    assert "(b) Current at 0 m, t = 6 h" in titles(ocean)
+    assert "(b) Current at 0 m" in titles(ocean)
+    assert ocean._suptitle.get_text().endswith("; currents of 2024-11-20 18:00 UTC")
     labels = [text for text, _ in written(ocean)]
     assert {
         "Longitude (°)",

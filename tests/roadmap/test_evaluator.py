@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import reference
+from helpers.reference import pair_of
 
 from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
@@ -22,6 +23,7 @@ from glider_stream.kernels.control import (
 from glider_stream.kernels.edges import Status
 from glider_stream.kernels.flow import velocity
 from glider_stream.kernels.motion import traced
+from glider_stream.kernels.place import Place
 from glider_stream.kernels.terrain import Seabed, allowed
 from glider_stream.roadmap.builder import build_roadmap
 from glider_stream.roadmap.neighbours import Nearest
@@ -152,14 +154,14 @@ def test_a_leg_is_what_an_independent_integrator_flies(evaluator, vortices):
 def landing(flow, polar, pair, angle, branch, printed=False):
     """Offset from q at q's depth, along and across the motion; the control on the line, and its path."""
     direction = CLIMB if pair[5] > pair[2] else DIVE
-    plane = control_plane(flow, *pair, 0.0)
+    plane = control_plane(flow, pair_of(pair[:3], pair[3:]))
     horizontal = horizontal_speed(polar, direction, angle)
     heading = heading_on_line(plane, horizontal, branch)
     if printed:  # the paper's same sign on both: v = (-B C + branch A S) / R
         r, u, v = plane.a**2 + plane.b**2, horizontal * math.cos(heading), horizontal * math.sin(heading)
         heading = math.atan2(-2 * plane.b * plane.c / r - v, u)
     c = control_towards(polar, direction, angle, heading)
-    rows = traced(flow, *pair[:3], 0.0, c.u, c.v, c.w, abs((pair[5] - pair[2]) / c.w), 2.0)
+    rows = traced(flow, Place(*pair[:3], 0.0), c, abs((pair[5] - pair[2]) / c.w), 2.0)
     off = rows[-1, 1:3] - pair[3:5]
     moving = np.add(velocity(flow, *pair[3:], 0.0), (c.u, c.v))
     moving /= np.linalg.norm(moving)
@@ -169,7 +171,7 @@ def landing(flow, polar, pair, angle, branch, printed=False):
 def crossings(flow, polar, pair, near=40.0, **options):
     """Angles between which a path passes q, by branch."""
     direction = CLIMB if pair[5] > pair[2] else DIVE
-    lowest = control_plane(flow, *pair, 0.0).lowest
+    lowest = control_plane(flow, pair_of(pair[:3], pair[3:])).lowest
     angles = [
         angle
         for angle in np.linspace(polar.steepest[direction], polar.shallowest[direction] * 1.5, 60)
@@ -225,7 +227,7 @@ def test_in_the_plane_a_path_stays_on_its_streamline(planar, glide):
         return sum(s * r * np.exp(0.5 - ((x - a) ** 2 + (y - b) ** 2) / (2 * r * r)) for a, b, r, s in rows)
 
     for pair in plane_pairs(10):
-        plane = control_plane(planar, *pair, 0.0)
+        plane = control_plane(planar, pair_of(pair[:3], pair[3:]))
         if plane.lowest > 0.8 * glide.best_horizontal[DIVE]:
             continue
         for branch in (1.0, -1.0):
@@ -275,7 +277,7 @@ def test_outside_the_flow(evaluator, sampled, gyre):
     inside, outside = [0.0, 0.0, 0.0], [240.0, 0.0, -60.0]
     for pair in ((inside, outside), (outside, inside), (outside, outside)):
         assert evaluator(sampled).connect_pair(*pair).status == Status.OUTSIDE_FLOW
-    known = gyre._replace(t_lo=0.0, t_hi=900.0)
+    known = gyre._replace(extent=gyre.extent._replace(t_lo=0.0, t_hi=900.0))
     reach = evaluator(known, SurfaceMethod, candidates=2000)
     assert reach.connect_pair([0.0, 0.0, 0.0], [60.0, 30.0, -60.0], 0.0).status == Status.CONNECTED
     assert reach.connect_pair([0.0, 0.0, 0.0], [60.0, 30.0, -60.0], 901.0).status == Status.OUTSIDE_FLOW
@@ -286,7 +288,7 @@ def test_too_far_down_or_away(evaluator, vortices, glide):
     judge = evaluator(vortices)
     assert judge.connect_pair([0.0, 0.0, 0.0], [9.0, 0.0, -1.001 * deepest]).status == Status.TOO_FAR
     assert judge.connect_pair([0.0, 0.0, 0.0], [9.0, 0.0, -0.999 * deepest]).status != Status.TOO_FAR
-    reach = 625.0 * (float(glide.best_horizontal[DIVE]) + vortices.max_speed) + 5.0
+    reach = 625.0 * (float(glide.best_horizontal[DIVE]) + vortices.extent.max_speed) + 5.0
     assert judge.connect_pair([0.0, 0.0, 0.0], [1.001 * reach, 0.0, -100.0]).status == Status.TOO_FAR
 
 
@@ -311,7 +313,8 @@ def test_a_current_faster_than_the_glider_everywhere(evaluator):
 
 def test_closed_form_in_uniform_flow(evaluator, sampled, glide):
     # the same current at all samples: straight over ground, so the leg is a triangle of velocities
-    flow = sampled._replace(values=np.full_like(sampled.values, 0.2), max_speed=0.2 * math.sqrt(2))
+    extent = sampled.extent._replace(max_speed=0.2 * math.sqrt(2))
+    flow = sampled._replace(values=np.full_like(sampled.values, 0.2), extent=extent)
     edge = evaluator(flow, candidates=2000).connect_pair([0.0, 0.0, 0.0], [120.0, -40.0, -100.0])
     assert edge.status == Status.CONNECTED
     along = edge.speed * math.cos(edge.glide_angle)

@@ -10,7 +10,7 @@ from helpers.small import SCENARIO, TOLERANCE, K, distance, roadmap, scenario_fi
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Status
-from glider_stream.pilot.export import EXPORTS
+from glider_stream.pilot.export import EXPORTS, Options
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
 from glider_stream.search.path import load_path
@@ -165,7 +165,7 @@ def test_the_leg_from_end_to_end_is_looked_at(problem, router):
 def test_who_is_there_already_need_not_go(router, place):
     path = router.query(place, place)
     assert (path.found, path.cost, path.travel_time, path.legs) == (True, 0, 0, ())
-    assert strict_json(EXPORTS[".json"](path, "path.json")["path.json"]) == {
+    assert strict_json(EXPORTS[".json"](path, "path.json", Options())["path.json"]) == {
         "found": True,
         "travel_time_s": 0,
         "cost": 0,
@@ -251,7 +251,10 @@ def test_no_path_is_an_answer(tmp_path):
     assert not path.found
     assert path.legs == ()
     assert path.trajectory.shape == (0, 4)
-    assert strict_json(file.read_text()) == {"found": False, "travel_time_s": None, "cost": None, "legs": []}
+    table = strict_json(file.read_text())
+    assert (table["found"], table["travel_time_s"], table["cost"], table["legs"]) == (False, None, None, [])
+    assert table["why"] == path.why
+    assert table["why_not"]["cause"] == "spacing"
     assert not planner.query(road, (1, 2, -3), (100, 20, -30)).found
 
 

@@ -11,6 +11,7 @@ from helpers.reference import flown
 from helpers.routes import route
 from helpers.small import TOLERANCE, command, roadmap, strict_json
 
+from glider_stream.base.clock import span
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Edge, Status
 from glider_stream.roadmap.store import write_roadmap
@@ -115,7 +116,7 @@ def test_from_the_command_line(tmp_path, capsys):
     assert fewer["unthinned"] == {"legs": len(whole["legs"]), "travel_time_s": whole["travel_time_s"]}
     assert len(fewer["legs"]) < len(whole["legs"])
     said = command(capsys, *asked).out.splitlines()[0]
-    assert said.endswith(f"; before it was thinned {len(whole['legs'])}, {whole['travel_time_s']:,.0f} s")
+    assert said.endswith(f"; before it was thinned {len(whole['legs'])}, {span(whole['travel_time_s'])}")
     for wrong in ("-1", "nan", "inf"):
         refused = command(capsys, *asked[:-1], wrong)
         assert (refused.code, f"got {wrong}" in refused.err) == (2, True)

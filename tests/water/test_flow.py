@@ -11,7 +11,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from glider_stream.kernels.flow import Flow, Grid, contains, mean_velocity, velocities, velocity
+from glider_stream.kernels.flow import Extent, Flow, Grid, contains, mean_velocity, velocities, velocity
 from glider_stream.scenario import read_scenario
 from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, SingleGyre, Uniform, Vortex, Vortices
 from glider_stream.water.inspect import divergence_ratio
@@ -25,10 +25,10 @@ def scattered(flow, count, seed=0, reach=220.0):
     """Points (x, y, z, t) inside a flow's box."""
     rng = np.random.default_rng(seed)
     spans = (
-        (max(flow.x_lo, -reach), min(flow.x_hi, reach)),
-        (max(flow.y_lo, -reach), min(flow.y_hi, reach)),
+        (max(flow.extent.x_lo, -reach), min(flow.extent.x_hi, reach)),
+        (max(flow.extent.y_lo, -reach), min(flow.extent.y_hi, reach)),
         HEIGHTS,
-        (max(flow.t_lo, 0.0), min(flow.t_hi, 3000.0)),
+        (max(flow.extent.t_lo, 0.0), min(flow.extent.t_hi, 3000.0)),
     )
     return tuple(lo + (hi - lo) * rng.random(count) for lo, hi in spans)
 
@@ -94,7 +94,7 @@ def test_flow_has_no_divergence(flows, kind):
     x, y, z, t = scattered(flow, 2000, seed=1)
     by_x = (velocities(flow, x + h, y, z, t) - velocities(flow, x - h, y, z, t))[:, 0] / (2 * h)
     by_y = (velocities(flow, x, y + h, z, t) - velocities(flow, x, y - h, z, t))[:, 1] / (2 * h)
-    scale = flow.max_speed / min(flow.length_scale, 1000.0)
+    scale = flow.extent.max_speed / min(flow.extent.length_scale, 1000.0)
     off_the_rim = (
         np.abs(np.hypot(x - flow.x, y - flow.y) - flow.radius) > 2 * h if kind == "rankine" else slice(None)
     )
@@ -110,7 +110,7 @@ def test_divergence_ratio_tells_a_grid_from_its_source(vortices, sampled):
 def test_uniform_flow_is_the_same_everywhere(flows):
     uv = velocities(flows["uniform"], *scattered(flows["uniform"], 100))
     assert (uv == (0.3, -0.2)).all()
-    assert flows["uniform"].max_speed == math.hypot(0.3, 0.2)
+    assert flows["uniform"].extent.max_speed == math.hypot(0.3, 0.2)
 
 
 @pytest.mark.parametrize("speed", [0.8, -0.8])
@@ -124,7 +124,7 @@ def test_vortex_peaks_at_its_radius_and_depth(speed):
     assert tangential[750] == pytest.approx(speed, rel=1e-14)
     assert velocity(flow, 95.0, -10.0, -110.0, 0.0)[1] == pytest.approx(speed / math.e, rel=1e-14)
     assert velocity(flow, 20.0, -10.0, -50.0, 0.0) == (0.0, 0.0)
-    assert flow.max_speed == pytest.approx(abs(speed), rel=1e-9)
+    assert flow.extent.max_speed == pytest.approx(abs(speed), rel=1e-9)
 
 
 def test_rankine_vortex_is_continuous_at_its_rim_and_solid_within(flows):
@@ -173,23 +173,25 @@ def test_double_gyre_has_the_published_values():
     # at a quarter period f = 1 where x^2 / 4 + x / 2 = 1: the wall between the gyres is at sqrt(5) - 1
     wall = math.sqrt(5) - 1
     assert max(abs(velocity(flow, wall, across, 0.0, 2.5)[0]) for across in (0.1, 0.3, 0.7)) < 1e-15
-    assert (flow.x_lo, flow.x_hi, flow.y_lo, flow.y_hi) == (0.0, 2.0, 0.0, 1.0)
+    assert (flow.extent.x_lo, flow.extent.x_hi, flow.extent.y_lo, flow.extent.y_hi) == (0.0, 2.0, 0.0, 1.0)
 
 
 def test_no_flow_crosses_the_walls_of_a_gyre(gyre):
+    known = gyre.extent
     for share, t in itertools.product(np.linspace(0, 1, 9), (0.0, 175.0, 400.0)):
-        x, y = gyre.x_lo + share * (gyre.x_hi - gyre.x_lo), gyre.y_lo + share * (gyre.y_hi - gyre.y_lo)
-        through = [velocity(gyre, wall, y, 0.0, t)[0] for wall in (gyre.x_lo, gyre.x_hi)]
-        through += [velocity(gyre, x, wall, 0.0, t)[1] for wall in (gyre.y_lo, gyre.y_hi)]
+        x = known.x_lo + share * (known.x_hi - known.x_lo)
+        y = known.y_lo + share * (known.y_hi - known.y_lo)
+        through = [velocity(gyre, wall, y, 0.0, t)[0] for wall in (known.x_lo, known.x_hi)]
+        through += [velocity(gyre, x, wall, 0.0, t)[1] for wall in (known.y_lo, known.y_hi)]
         assert np.abs(through).max() < 1e-15
 
 
 def test_single_gyre_is_half_of_the_steady_double_one():
     single = SingleGyre(amplitude=0.3, length=100.0).kernel(HEIGHTS)
     double = DoubleGyre(amplitude=0.3, length=100.0, epsilon=0.0, period=7.0).kernel(HEIGHTS)
-    assert (single.x_hi, double.x_hi, single.y_hi) == (100.0, 200.0, 100.0)
+    assert (single.extent.x_hi, double.extent.x_hi, single.extent.y_hi) == (100.0, 200.0, 100.0)
     assert velocity(single, 30.0, 40.0, -5.0, 11.0) == velocity(double, 30.0, 40.0, -5.0, 3.0)
-    assert single.max_speed == pytest.approx(0.3 * math.pi)
+    assert single.extent.max_speed == pytest.approx(0.3 * math.pi)
 
 
 # bounds
@@ -200,8 +202,8 @@ def test_max_speed_bounds_every_flow(flows, kind):
     flow = flows[kind]
     uv = velocities(flow, *scattered(flow, 100_000, seed=4))
     fastest = np.hypot(uv[:, 0], uv[:, 1]).max()
-    assert fastest <= flow.max_speed
-    assert flow.max_speed <= {"vortices": 2.0, "gyre": 1.6}.get(kind, 1.3) * fastest
+    assert fastest <= flow.extent.max_speed
+    assert flow.extent.max_speed <= {"vortices": 2.0, "gyre": 1.6}.get(kind, 1.3) * fastest
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -220,13 +222,13 @@ def test_max_speed_of_vortices_is_a_bound_at_most_twice_too_high(seed):
     x, y, z = (lo + (hi - lo) * rng.random((100_000, 3))).T.copy()
     uv = velocities(flow, x, y, z, np.zeros(x.size))
     fastest = np.hypot(uv[:, 0], uv[:, 1]).max()
-    assert fastest <= flow.max_speed <= 2 * fastest
+    assert fastest <= flow.extent.max_speed <= 2 * fastest
 
 
 def test_max_speed_knows_the_depths_of_interest():
     deep = Vortices((Vortex(0.0, 0.0, 50.0, 1.0, 150.0, 50.0),))
-    assert deep.kernel((-50.0, 0.0)).max_speed == pytest.approx(math.exp(-1), rel=1e-9)
-    assert deep.kernel((-100.0, 0.0)).max_speed == pytest.approx(1.0, rel=1e-9)
+    assert deep.kernel((-50.0, 0.0)).extent.max_speed == pytest.approx(math.exp(-1), rel=1e-9)
+    assert deep.kernel((-100.0, 0.0)).extent.max_speed == pytest.approx(1.0, rel=1e-9)
 
 
 def test_the_papers_box_is_as_fast_as_the_paper_says():
@@ -236,7 +238,7 @@ def test_the_papers_box_is_as_fast_as_the_paper_says():
     uv = velocities(flow, x, y, rng.uniform(-300, 0, x.size), np.zeros(x.size))
     fastest = np.hypot(uv[:, 0], uv[:, 1]).max()
     assert fastest == pytest.approx(1.9, abs=0.03)
-    assert fastest <= flow.max_speed <= 2 * fastest
+    assert fastest <= flow.extent.max_speed <= 2 * fastest
 
 
 # grids
@@ -253,11 +255,9 @@ def test_grid_reproduces_a_trilinear_field_exactly():
     x, y, z = np.linspace(-100, 140, 7), np.linspace(-50, 250, 11), np.linspace(-250, 0, 5)
     zz, xx, yy = np.meshgrid(z, x, y, indexing="ij")
     values = np.stack(multilinear(xx, yy, zz), axis=-1)
-    spans = {"x_lo": -100.0, "x_hi": 140.0, "y_lo": -50.0, "y_hi": 250.0, "t_lo": -math.inf, "t_hi": math.inf}
+    extent = Extent(-100.0, 140.0, -50.0, 250.0, -math.inf, math.inf, max_speed=1.0, length_scale=40.0)
     unused = np.zeros(len(values))
-    flow = Grid(
-        values, unused, unused, 1 / 40, 1 / 30, -250.0, 1 / 62.5, **spans, max_speed=1.0, length_scale=40.0
-    )
+    flow = Grid(values, unused, unused, 1 / 40, 1 / 30, -250.0, 1 / 62.5, extent)
     rng = np.random.default_rng(6)
     px, py, pz = rng.uniform(-100, 140, 1000), rng.uniform(-50, 250, 1000), rng.uniform(-250, 0, 1000)
     # the corners too: the last cell's upper ends
@@ -301,21 +301,22 @@ def test_sampling_converges_at_second_order(vortices):
 
 def test_flow_is_known_in_its_box_and_span_alone(flows):
     for kind, flow in flows.items():
-        x, y, t = 0.5 * (max(flow.x_lo, -9) + min(flow.x_hi, 9)), 0.0, 100.0
+        known = flow.extent
+        x, y, t = 0.5 * (max(known.x_lo, -9) + min(known.x_hi, 9)), 0.0, 100.0
         assert contains(flow, x, y, t), kind
-        if math.isfinite(flow.x_lo):
-            assert contains(flow, flow.x_lo, flow.y_hi, t), kind
-            outside = [(flow.x_lo - 0.1, y), (flow.x_hi + 0.1, y), (x, flow.y_lo - 0.1), (x, flow.y_hi + 0.1)]
+        if math.isfinite(known.x_lo):
+            assert contains(flow, known.x_lo, known.y_hi, t), kind
+            outside = [(known.x_lo - 0.1, y), (known.x_hi + 0.1, y), (x, known.y_lo - 0.1), (x, known.y_hi + 0.1)]
             assert not any(contains(flow, *place, t) for place in outside), kind
-        if math.isfinite(flow.t_lo):
-            assert not contains(flow, x, y, flow.t_lo - 1.0), kind
-            assert not contains(flow, x, y, flow.t_hi + 1.0), kind
-    assert Counter(math.isfinite(flow.x_lo) for flow in flows.values()) == {True: 3, False: 4}
+        if math.isfinite(known.t_lo):
+            assert not contains(flow, x, y, known.t_lo - 1.0), kind
+            assert not contains(flow, x, y, known.t_hi + 1.0), kind
+    assert Counter(math.isfinite(flow.extent.x_lo) for flow in flows.values()) == {True: 3, False: 4}
 
 
 def test_extent_of_an_analytic_flow_is_what_the_scenario_says():
     flow = Uniform(0.1, 0.0, x=(-5.0, 5.0)).kernel(HEIGHTS)
-    assert (flow.x_lo, flow.x_hi, flow.y_lo, flow.y_hi) == (-5.0, 5.0, -math.inf, math.inf)
+    assert flow.extent[:4] == (-5.0, 5.0, -math.inf, math.inf)
     assert contains(flow, 5.0, 1e9, 0.0)
     assert not contains(flow, 5.001, 0.0, 0.0)
 

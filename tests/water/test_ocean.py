@@ -437,9 +437,9 @@ FRAME = LocalFrame.over(*DOMAIN[:2])
 def test_the_flow_of_a_domain(tmp_path):
     file = read_currents(written(tmp_path, dataset()))
     flow, seabed = ocean_flow(file, FRAME, *DOMAIN, "2023-02-27T03:00:00Z")
-    assert (flow.t_lo, flow.t_hi) == (-3 * 3600, 21 * 3600)
+    assert (flow.extent.t_lo, flow.extent.t_hi) == (-3 * 3600, 21 * 3600)
     assert flow.values.shape[2:4] == (10, 13)
-    assert flow.length_scale == pytest.approx(5500, rel=0.02)
+    assert flow.extent.length_scale == pytest.approx(5500, rel=0.02)
     rng = np.random.default_rng(1)
     for lon, lat, depth, hours in rng.uniform((20.4, 60.15, 0.5, 0), (21.1, 60.65, 195, 24), (50, 4)):
         x, y = (float(part) for part in FRAME.to_local(lon, lat))
@@ -447,7 +447,7 @@ def test_the_flow_of_a_domain(tmp_path):
         turn = float(FRAME.convergence(lon, lat))
         east, north = u * math.cos(turn) + v * math.sin(turn), v * math.cos(turn) - u * math.sin(turn)
         assert (east, north) == pytest.approx(current(lon, lat, depth, hours), abs=1e-4)
-        assert math.hypot(u, v) <= flow.max_speed
+        assert math.hypot(u, v) <= flow.extent.max_speed
         assert contains(flow, x, y, 0.0)
         assert allowed(seabed, x, y, -depth)
     x, y = (float(part) for part in FRAME.to_local(20.1, 60.4))
@@ -495,7 +495,7 @@ def test_a_single_level_and_a_single_time_are_doubled(tmp_path):
     file = read_currents(written(tmp_path, dataset().isel(depth=[0], time=[0])))
     flow, _ = ocean_flow(file, FRAME, *DOMAIN[:2], (0.0, 0.5))
     assert flow.values.shape[:2] == (2, 2)
-    assert (flow.t_lo, flow.t_hi) == (-math.inf, math.inf)
+    assert (flow.extent.t_lo, flow.extent.t_hi) == (-math.inf, math.inf)
     assert velocity(flow, 0.0, 0.0, -0.3, 1e6) == velocity(flow, 0.0, 0.0, 0.0, -5.0)
 
 
@@ -674,6 +674,6 @@ def test_a_flow_of_a_real_coast():
     frame = LocalFrame.over(lon, lat)
     flow, seabed = ocean_flow(read_currents(GALICIA), frame, lon, lat, depth, "2025-01-02T06:00")
     assert np.isfinite(flow.values).all()
-    assert flow.max_speed < 0.3
+    assert flow.extent.max_speed < 0.3
     assert 0 < (seabed.bottom == 0).mean() < 0.6
     assert seabed.bottom.min() > -220

@@ -10,7 +10,7 @@ from ...base.arrays import Array, Bools
 from ...base.checks import Range
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import OceanGrid, velocities
+from ...kernels.flow import Extent, OceanGrid, velocities
 from ...kernels.terrain import Seabed, allowed
 from ..frame import MAX_SCALE_ERROR, LocalFrame
 from .bottom import Bottom
@@ -114,15 +114,13 @@ def _assemble(
         index_map=at.index_map,
         per_x=at.per_x,
         per_y=at.per_y,
-        x_lo=at.x_lo,
-        x_hi=at.x_hi,
-        y_lo=at.y_lo,
-        y_hi=at.y_hi,
-        t_lo=span[0],
-        t_hi=span[1],
-        # every read value is a weighted mean of nodes
-        max_speed=float(np.sqrt((values**2).sum(axis=-1).max())) * (1 + 1e-12),
-        length_scale=spacing,
+        extent=Extent(
+            *(at.x_lo, at.x_hi, at.y_lo, at.y_hi),
+            *span,
+            # every read value is a weighted mean of nodes
+            max_speed=float(np.sqrt((values**2).sum(axis=-1).max())) * (1 + 1e-12),
+            length_scale=spacing,
+        ),
     )
     seabed = Seabed(np.ascontiguousarray(bottom), clearance, at.index_map, at.per_x, at.per_y, at.x_lo, at.y_lo)
     return flow, seabed

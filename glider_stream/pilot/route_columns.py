@@ -1,0 +1,204 @@
+"""Columns and properties of route files: which name and unit says what, and the refusal of what nobody knows.
+
+A number that is dropped may be the depth that a vehicle should have flown at. So each name is known to place the
+vehicle, known to place nothing, or refused.
+"""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from ..base.errors import InputError
+
+
+class NotARoute(InputError):
+    """Why a file is not a route, and what to do; the reader of the file puts the file's name before it."""
+
+
+NAMES = {
+    "lon": ("lon", "long", "lng", "longitude"),
+    "lat": ("lat", "latitude"),
+    "x": ("x",),
+    "y": ("y",),
+    "depth": ("depth",),
+    "altitude": ("altitude", "alt", "elevation", "ele"),
+    "z": ("z",),
+}
+"""What places a vehicle, and how files call it; a depth counts downward, an altitude upward."""
+HEIGHTS = ("depth", "altitude", "z")
+METRES = {
+    **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), 1.0),
+    "cm": 0.01,
+    "km": 1000.0,
+    **dict.fromkeys(("ft", "foot", "feet"), 0.3048),
+    **dict.fromkeys(("fathom", "fathoms"), 1.8288),
+}
+DEGREES = dict.fromkeys(
+    (
+        *("", "°", "deg", "degree", "degrees", "decimal degrees", "dd", "degrees e", "degrees n", "°e", "°n"),
+        *("degree_east", "degrees_east", "degree_north", "degrees_north", "degrees east", "degrees north"),
+    ),
+    1.0,
+)
+"""Units by how headers write them, and how many metres or degrees each of them is."""
+UNITS = {"lon": DEGREES, "lat": DEGREES}
+_IGNORED = (
+    "id fid gid ogc_fid objectid index idx no nr num number n count seq sequence order ord rank row leg "
+    "legs stop point waypoint wp wpt name label title code vehicle glider sym symbol type kind visible "
+    "visibility folder eta etd time timestamp date datetime day hour hours minute second seconds year "
+    "month arrives departs duration duration_s travel_time travel_time_s speed speed_over_ground sog stw "
+    "velocity course cog heading bearing track azimuth direction distance dist length shape_length "
+    "shape_leng shape__length radius range progress pitch roll yaw glide_angle current_u current_v u v "
+    "temp atemp temperature wtemp hr cad power battery fix sat satellites hdop vdop pdop magvar "
+    "geoidheight ageofdgpsdata dgpsid stroke_width stroke_opacity fill_opacity marker_size tessellate "
+    "extrude draworder icon begin end scale opacity width color colour arrival_radius desc description "
+    "cmt comment comments note notes src source text url href link styleurl stroke fill snippet address "
+    "phonenumber lookat "
+)
+IGNORED = frozenset(_IGNORED.split())
+"""Names of numbers that do not place a vehicle; a route is read without them."""
+BRACKETS = re.compile(r"^(.*?)\s*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
+
+
+class Column(NamedTuple):
+    """What a column says: one of NAMES, and by how much its numbers are multiplied to be metres or degrees."""
+
+    role: str
+    scale: float
+
+
+def bare_name(header: str) -> tuple[str, str]:
+    """A header's name and its unit, in lower case: `Depth (m)`, `depth [m]` and `depth_m` say the same."""
+    text = " ".join(header.strip().lower().split())
+    fits = BRACKETS.match(text)
+    if fits:
+        return fits[1].replace(" ", "_").replace("-", "_"), fits[2]
+    name = text.replace(" ", "_").replace("-", "_")
+    front, underscore, unit = name.rpartition("_")
+    known = any(front in names for names in NAMES.values()) and unit in {**METRES, **DEGREES}
+    return (front, unit) if underscore and known else (name, "")
+
+
+def column_of(header: str) -> Column | None:
+    """What a header means; None where its name is not known, NotARoute where its unit is not."""
+    name, unit = bare_name(header)
+    role = next((role for role, names in NAMES.items() if name in names), None)
+    if role is None:
+        return None
+    units = UNITS.get(role, METRES)
+    if unit not in units:
+        wanted = "degrees" if units is DEGREES else "m, km, cm, ft or fathoms"
+        raise NotARoute(f"the unit of its column {header.strip()!r} is not known; give it in {wanted}")
+    return Column(role, units[unit])
+
+
+def number(value: Any) -> float | None:
+    """A finite number, or None: truth values are not numbers, texts of numbers are."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    try:
+        found = float(value)
+    except (ValueError, OverflowError):
+        return None
+    return found if math.isfinite(found) else None
+
+
+def refuse_unknown(header: str, values: Iterable[Any], what: str) -> None:
+    """NotARoute where a name that is not known holds numbers."""
+    name, _ = bare_name(header)
+    if name in IGNORED or all(number(value) is None for value in values):
+        return
+    raise NotARoute(
+        f"its {what} {header.strip()!r} holds numbers, and their meaning is not known; if they place the vehicle "
+        "call it depth (metres, downward) or altitude (metres, upward), else remove it"
+    )
+
+
+def told_height(values: Mapping[str, Any], what: str) -> float | None:
+    """The height [m, upward] that the properties of a point say, None where they say nothing of it."""
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        column = column_of(name) if number(value) is not None else None
+        if column is None:
+            refuse_unknown(name, [value], what)
+        elif column.role == "z":
+            raise NotARoute(f"its {what} {name!r} may count up or down; call it depth or altitude")
+        elif column.role in HEIGHTS:
+            amount = (number(value) or 0.0) * column.scale
+            found[name] = amount if column.role == "altitude" else 0.0 - amount
+    if len(set(found.values())) > 1:
+        raise NotARoute(f"its {what}s {', '.join(found)} say different depths of one point; keep one of them")
+    return next(iter(found.values()), None)
+
+
+def depth_of(third: float | None, told: float | None) -> float:
+    """The depth [m] of a point, of its third coordinate and what its properties say [m, upward]; 0 if neither."""
+    if third and told is not None and third != told:
+        raise NotARoute(
+            f"a point has an altitude of {third:g} m and properties that say {told:g} m; keep one of them"
+        )
+    return 0.0 - (third or told or 0.0)
+
+
+def csv_points(text: str) -> tuple[list[Any], bool]:
+    """The points of a table with a header, and whether they are lon, lat, depth; else they are x, y, z."""
+    text = text.lstrip()
+    first = text.partition("\n")[0]
+    rows = [row for row in csv.reader(io.StringIO(text), delimiter=max(",;\t", key=first.count)) if row]
+    headers = [name.strip() for name in rows[0]] if rows else []
+    columns = {name: column_of(name) for name in headers}
+    where: dict[str, int] = {}
+    for n, name in enumerate(headers):
+        column = columns[name]
+        if column is None:
+            continue
+        role = "height" if column.role in HEIGHTS else column.role
+        if role in where:
+            raise NotARoute(f"its columns {headers[where[role]]!r} and {name!r} say the same; remove one of them")
+        where[role] = n
+    for across, along in (("lon", "lat"), ("x", "y")):
+        if across in where and along in where:
+            geographic = across == "lon"
+            break
+    else:
+        known = ", ".join(name.lower() for name in headers if name and name.isprintable()) or "none"
+        raise NotARoute(f"its columns are {known}, and not lon, lat, depth or x, y, z; name them so")
+    if len({"lon", "lat", "x", "y"} & set(where)) > 2:
+        raise NotARoute("it has columns for lon, lat and for x, y; remove two of them")
+    if "height" not in where and "depth_min" in headers:  # the depths of our own table are those of whole legs
+        raise NotARoute(
+            "it says neither where the first leg begins nor how deep legs end; give the .json instead"
+        )
+    for n, name in enumerate(headers):
+        if columns[name] is None:
+            refuse_unknown(name, (row[n] for row in rows[1:] if n < len(row)), "column")
+    return [_point(row, headers, columns, where, geographic) for row in rows[1:]], geographic
+
+
+def _point(
+    row: list[str], headers: list[str], columns: dict[str, Column | None], where: dict[str, int], geographic: bool
+) -> tuple[Any, Any, Any]:
+    """Three values of a row, in metres and degrees where they are numbers, else as they stand."""
+    values: list[Any] = []
+    for role in ("lon", "lat", "height") if geographic else ("x", "y", "height"):
+        if role not in where:
+            values.append(0.0)
+            continue
+        column = columns[headers[where[role]]]
+        assert column is not None
+        if geographic and column.role == "z":
+            name = headers[where[role]]
+            raise NotARoute(
+                f"its column {name!r} may count up or down beside lon, lat; call it depth or altitude"
+            )
+        text = row[where[role]] if where[role] < len(row) else None
+        amount = number(text)
+        if amount is None:
+            values.append(text)
+            continue
+        turned = role == "height" and (column.role == "depth") != geographic
+        values.append((-amount if turned else amount) * column.scale + 0.0)
+    return values[0], values[1], values[2]

@@ -1,0 +1,237 @@
+"""Routes in KML and GPX, as maps and plotters write them."""
+
+import re
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as Xml
+
+from .route_columns import NotARoute, depth_of, told_height
+
+Place = tuple[Any, Any, Any]
+CONTAINERS = ("kml", "Document", "Folder")
+LINES = ("LineString", "Track")
+OUR_NAME = "glider-stream route"
+FIRST, STOP = "START", "WP{:03}"
+"""How our files call the place where a route begins, and the ends of its legs, counted from 1."""
+OURS = re.compile(r"START|WP\d+")
+
+
+class Mark(NamedTuple):
+    """A point of a map: its name, and lon, lat [degrees], depth [m]."""
+
+    name: str
+    place: Place
+
+
+def our_stops(marks: list[Mark]) -> list[Mark]:
+    """The marks that are named as our files name a route's stops, in their order; none where one is missing."""
+    by_name = {mark.name: mark for mark in marks}
+    first = [by_name[FIRST]] if FIRST in by_name else []
+    stops: list[Mark] = []
+    while STOP.format(len(stops) + 1) in by_name:
+        stops.append(by_name[STOP.format(len(stops) + 1)])
+    named = sum(1 for name in by_name if name != FIRST and OURS.fullmatch(name))
+    return first + stops if stops and len(stops) == named else []
+
+
+def route_of(lines: list[list[Place]], marks: list[Mark], ours: bool) -> list[Place]:
+    """The route among lines and points: a line that is alone, and points beside it are marks on a map.
+
+    Of our files the line is the curved track, and the route is where it begins and where its legs end: also
+    where another program saved it again, and kept but our marks' names and places.
+    """
+    if len(lines) > 1:
+        raise NotARoute(f"it holds {len(lines)} lines, and a route is one; keep one of them")
+    stops = our_stops(marks)
+    if not lines:
+        if stops and stops[0].name != FIRST and len(stops) == len(marks):
+            raise NotARoute("it holds where our legs end, and not where the route begins; export the route again")
+        return [mark.place for mark in marks]
+    if stops and (ours or _along(lines[0], stops)):
+        begins = [] if stops[0].name == FIRST else [lines[0][0]]
+        return [*begins, *(stop.place for stop in stops)]
+    return lines[0]
+
+
+def _along(line: list[Place], stops: list[Mark]) -> bool:
+    """Whether all stops are points of the line, in its order, and the last one is its end."""
+    at = 0
+    for stop in stops:
+        while at < len(line) and not _same(line[at], stop.place):
+            at += 1
+        if at == len(line):
+            return False
+    return _same(line[-1], stops[-1].place)
+
+
+def _same(a: Place, b: Place) -> bool:
+    """Equal but for rounding, and for a turn at the date line."""
+    across = (float(a[0]) - float(b[0]) + 180.0) % 360.0 - 180.0
+    return abs(across) < 2e-6 and abs(float(a[1]) - float(b[1])) < 2e-6 and abs(float(a[2]) - float(b[2])) < 0.5
+
+
+def _tree(text: str) -> Xml.Element:
+    # entities are declared in a document type, and only there
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise NotARoute("it declares a document type, which is not read; export it again without")
+    return Xml.fromstring(text)
+
+
+def _kind(element: Xml.Element) -> str:
+    """An element's name, whatever its namespace."""
+    return element.tag.rsplit("}", 1)[-1]
+
+
+def _named(tree: Xml.Element, name: str) -> list[Xml.Element]:
+    return [one for one in tree.iter() if _kind(one) == name]
+
+
+def _text(tree: Xml.Element, name: str) -> str:
+    """The text of the first child of that name, empty if there is none."""
+    return next(((one.text or "").strip() for one in tree if _kind(one) == name), "")
+
+
+# KML
+
+
+class _Shape(NamedTuple):
+    """A line or a point of a KML file: the placemark and the folder that it stands in, if any."""
+
+    element: Xml.Element
+    placemark: Xml.Element | None
+    folder: Xml.Element | None
+
+
+def _shapes(tree: Xml.Element) -> list[_Shape]:
+    """All lines and points, in the order of the file; without recursion, since a file may be deep."""
+    found, waiting = [], [_Shape(tree, None, tree)]
+    while waiting:
+        element, placemark, folder = waiting.pop()
+        kind = _kind(element)
+        if kind in (*LINES, "Point"):
+            found.append(_Shape(element, placemark, folder))
+            continue
+        inner = element if kind in CONTAINERS else folder
+        mark = element if kind == "Placemark" else placemark
+        waiting += [_Shape(child, mark, inner) for child in reversed(element)]
+    return found
+
+
+def kml_points(text: str) -> tuple[list[Place], list[str]]:
+    """The route of a KML file, lon, lat [degrees], depth [m], and what was left out of it."""
+    tree, notes = _tree(text), list[str]()
+    shapes = _shapes(tree)
+    lines = [shape for shape in shapes if _kind(shape.element) in LINES]
+    points = [shape for shape in shapes if _kind(shape.element) == "Point"]
+    if lines:
+        # what stands in other folders was not drawn with the line
+        points = [shape for shape in points if shape.folder is lines[0].folder]
+    folders = list({id(shape.folder): shape.folder for shape in points}.values())
+    if len(folders) > 1:
+        names = ", ".join(
+            repr(_text(folder, "name") or "without a name") for folder in folders if folder is not None
+        )
+        raise NotARoute(
+            f"its points lie in {len(folders)} folders ({names}), and a route is one; keep one of them"
+        )
+    ours = any(one.text == OUR_NAME for one in _named(tree, "name"))
+    if lines:
+        # any other is a mark on the map, and how high it stands is nobody's concern
+        points = [shape for shape in points if OURS.fullmatch(_name(shape))]
+    marks = [mark for shape in points for mark in _marked(shape, notes)]
+    found = route_of([_coordinates(shape, notes) for shape in lines], marks, ours)
+    if not found:
+        raise NotARoute("it holds no line and no points; draw a path, and export that")
+    return found, list(dict.fromkeys(notes))
+
+
+def _name(shape: _Shape) -> str:
+    return "" if shape.placemark is None else _text(shape.placemark, "name")
+
+
+def _marked(shape: _Shape, notes: list[str]) -> list[Mark]:
+    """The places of a point's element."""
+    told = None if shape.placemark is None else told_height(_data(shape.placemark), "data")
+    places = _coordinates(shape, notes)
+    return [Mark(_name(shape), (a, b, depth_of(0.0 - depth, told))) for a, b, depth in places]
+
+
+def _data(placemark: Xml.Element) -> dict[str, str]:
+    """What a placemark's ExtendedData say, by name."""
+    data = {one.get("name", ""): _text(one, "value") for one in _named(placemark, "Data")}
+    return data | {one.get("name", ""): (one.text or "").strip() for one in _named(placemark, "SimpleData")}
+
+
+def _coordinates(shape: _Shape, notes: list[str]) -> list[Place]:
+    """The places of a line or point: lon, lat, and the depth that the altitude mode gives them."""
+    element = shape.element
+    if _kind(element) == "Track":
+        values = [[float(value) for value in (one.text or "").split()] for one in _named(element, "coord")]
+    else:
+        texts = " ".join(one.text or "" for one in _named(element, "coordinates"))
+        values = [[float(value) for value in place.split(",")] for place in texts.split()]
+    if _kind(element) in LINES and shape.placemark is not None:
+        height = told_height(_data(shape.placemark), "data")
+        if height is not None:
+            raise NotARoute("its line has data that say one depth; write it as the altitude of each point")
+    heights = [value[2] if len(value) > 2 else 0.0 for value in values]
+    counted = _heights(_text(element, "altitudeMode") or "clampToGround", heights, notes)
+    return [(value[0], value[1], 0.0 - height) for value, height in zip(values, counted, strict=True)]
+
+
+def _heights(mode: str, heights: list[float], notes: list[str]) -> list[float]:
+    """Heights above the sea [m] of altitudes in an altitude mode (KML 2.2, and Google's two of the seabed)."""
+    if mode == "absolute":
+        return heights
+    raised = any(height != 0.0 for height in heights)
+    if mode == "clampToGround":
+        if raised:
+            notes.append(
+                "altitudes are ignored where the altitude mode is clampToGround, the default: these points lie "
+                "at the surface; write <altitudeMode>absolute</altitudeMode> if they count"
+            )
+        return [0.0] * len(heights)
+    if mode == "relativeToGround" and not raised:
+        return heights  # on the sea, a map's ground is its surface
+    raise NotARoute(
+        f"its altitudes count from the ground or the seabed (altitude mode {mode}); "
+        "save them as absolute, negative below the surface"
+    )
+
+
+# GPX
+
+
+def gpx_points(text: str) -> list[Place]:
+    """The route of a GPX file, lon, lat [degrees], depth [m]: its route, else its track, else its way points."""
+    tree = _tree(text)
+    routes, tracks = ([_gpx_marks(one, f"{kind}pt") for one in _named(tree, kind)] for kind in ("rte", "trk"))
+    routes, tracks = ([marks for marks in some if marks] for some in (routes, tracks))
+    for some, what in ((routes, "routes"), (tracks, "tracks")):
+        if len(some) > 1 and (some is routes or not routes):
+            raise NotARoute(f"it holds {len(some)} {what}, and a route is one; keep one of them")
+    marks = (routes or tracks or [_gpx_marks(tree, "wpt")])[0]
+    stops = our_stops(marks)
+    if stops and stops[0].name == FIRST:
+        return [stop.place for stop in stops]
+    if stops and len(stops) == len(marks):
+        # a route of an earlier version: its track alone holds where it begins
+        if not tracks:
+            raise NotARoute("it holds where our legs end, and not where the route begins; export the route again")
+        return [tracks[0][0].place, *(stop.place for stop in stops)]
+    if not marks:
+        raise NotARoute("it holds no route point, way point or track point; draw a route, and export that")
+    return [mark.place for mark in marks]
+
+
+def _gpx_marks(tree: Xml.Element, kind: str) -> list[Mark]:
+    """Points of GPX with their names."""
+    marks = []
+    for one in _named(tree, kind):
+        leaves = [inner for inner in one.iter() if len(inner) == 0 and inner is not one]
+        values = {_kind(inner): (inner.text or "").strip() for inner in leaves}
+        height = values.pop("ele", "")
+        name = values.pop("name", "")
+        told = told_height(values, "point's element")
+        depth = depth_of(float(height) if height else None, told)
+        marks.append(Mark(name, (float(one.attrib["lon"]), float(one.attrib["lat"]), depth)))
+    return marks

@@ -1,0 +1,86 @@
+"""How far off the integration's step puts legs: a sample of them, flown again in finer steps."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import Array, Index
+from ..base.settings import require
+from ..kernels.edges import CONNECTED, Edge
+from .problem import Problem
+from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
+
+SAMPLED_NODES, SAMPLED_LEGS = 8, 64
+"""The legs that are flown again: some of each of a few nodes, evenly chosen by their numbers."""
+FINER = 0.381966
+"""The finer step, in steps: near a half, but no simple fraction. A flow that repeats itself every step, or every
+half one, would look the same in half steps."""
+
+
+@dataclass(frozen=True)
+class StepError:
+    """Of `legs` legs, flown in steps of `dt` [s], the worst ends `off` [m] from where it does in finer steps."""
+
+    off: float
+    legs: int
+    dt: float
+    tolerance: float
+
+    def check(self) -> None:
+        """InputError where it exceeds the tolerance."""
+        worst = f"of {self.legs} legs, the worst ends {self.off:.3g} m off"
+        cure = "make `integration.dt` smaller, and `integration.steps` larger by as much"
+        require(
+            self.off <= self.tolerance,
+            f"`integration.dt` = {self.dt:g} s is too coarse for this flow: {worst}, more than the tolerance of "
+            f"{self.tolerance:g} m; {cure}",
+        )
+
+    def __str__(self) -> str:
+        if self.legs == 0:
+            return f"of {self.dt:g} s, no leg to try them on"
+        return f"of {self.dt:g} s, off by {self.off:.2g} m at most in {self.legs} legs flown again in finer steps"
+
+
+def sampled_nodes(count: int) -> Index:
+    """The nodes of so many whose legs are flown again: the same for all parts, and every run, of a build."""
+    return np.unique(np.linspace(0, count - 1, SAMPLED_NODES).astype(np.int64))
+
+
+def step_error(problem: Problem, start: Array, values: Array) -> StepError:
+    """How far off some of the legs from `start` (n, 3) [m] end; their `values` (n, 6) as EDGE_FIELDS says."""
+    evaluator = problem.evaluator
+    integration = evaluator.integration
+    finer = replace(evaluator, integration=replace(integration, dt=FINER * integration.dt))
+    some = np.unique(np.linspace(0, len(values) - 1, min(SAMPLED_LEGS, len(values))).astype(np.int64))
+    off = 0.0
+    for n in some:
+        leg = Edge(CONNECTED, *(float(value) for value in values[n]))
+        ends = [one.trace(start[n], leg, problem.departure)[-1, 1:] for one in (evaluator, finer)]
+        off = max(off, float(np.linalg.norm(ends[0] - ends[1])))
+    return StepError(off, len(some), integration.dt, integration.tolerance)
+
+
+def with_steps_checked(
+    made: Provenance, problem: Problem, position: Array, find: Callable[[Index], Edges]
+) -> Provenance:
+    """What makes a roadmap, with words on its steps; InputError where they are too coarse.
+
+    `find` evaluates some of the nodes `position` (n, 3) [m].
+    """
+    edges = find(sampled_nodes(len(position)))
+    error = step_error(problem, position[np.repeat(edges.source, edges.degree)], edges.values)
+    error.check()
+    return replace(made, steps=str(error))
+
+
+def check_steps(roadmap: Roadmap, problem: Problem) -> None:
+    """InputError where the steps of a roadmap are too coarse for its flow; if its build did not look already."""
+    if roadmap.provenance.steps:
+        return
+    nodes = sampled_nodes(len(roadmap.position))
+    degree = np.diff(roadmap.indptr)
+    mine = np.repeat(np.isin(np.arange(len(degree)), nodes), degree)
+    start = np.repeat(roadmap.position, degree, axis=0)[mine]
+    step_error(problem, start, np.column_stack([getattr(roadmap, name)[mine] for name in EDGE_FIELDS])).check()
