@@ -128,6 +128,9 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 @click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
 @click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
 @click.option(
+    "--polish", is_flag=True, help="Move its stops, cut its legs, count its yos anew: nothing near is better."
+)
+@click.option(
     "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
 )
 @click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
@@ -146,6 +149,7 @@ def query(
     most_energy: float | None,
     most_yos: int | None,
     most_hours: float | None,
+    polish: bool,
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
@@ -165,11 +169,11 @@ def query(
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if front:
-        alone = not outputs and most_energy is None and thin is None and not asked and not as_card
+        alone = not outputs and most_energy is None and not polish and thin is None and not asked and not as_card
         if not alone:
             raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
-                "--waypoints and --arrival-radius; leave one of them out"
+                "--trade-off goes with none of --output, --most-energy, --polish, --thin, --card, "
+                "--window-hours, --waypoints and --arrival-radius; leave one of them out"
             )
         corners = open(roadmap).trade_off(start, goal, surfacing=rule)
         said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
@@ -178,7 +182,14 @@ def query(
             check_export(output)
         road = open(roadmap)
         path = road.query(
-            start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
+            start,
+            goal,
+            outputs=outputs,
+            most_energy=most_energy,
+            polish=polish,
+            thin=thin,
+            surfacing=rule,
+            **asked,
         )
         for note in path.notes:
             click.echo(f"note: {note}", err=True)

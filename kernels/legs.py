@@ -1,20 +1,28 @@
 """Legs flown as they are told: many controls, each from its own place and time for its own duration."""
 
-from .cache import entry_point, kernel
+from .cache import entry_point, inlined, kernel
 from .edges import CLEARANCE_SPACING
-from .flight import FLIGHT_ROWS, LEFT, advance, fly_for, hangar, place, rest
-from .motion import LANES, X, Y, is_clear, stays_inside
+from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_for, hangar, place, rest
+from .motion import LANE_X, LANE_Y, LANES, is_clear, stays_inside
+from .place import Place, Velocity
 
 _LEG = FLIGHT_ROWS
 """The row of a lane that says which leg it flies."""
 
 
+@inlined
+def _leg_of(start, through, leg):
+    """Where a leg begins, and its velocity through water."""
+    x, y, z, t = start[leg]
+    u, v, w = through[leg]
+    return Place(x, y, z, t), Velocity(u, v, w)
+
+
 @kernel
 def _take_off(start, through, duration, dt, leg, lanes, n):
     """Send lane n off on a leg."""
-    x, y, z, t = start[leg]
-    u, v, w = through[leg]
-    place(lanes, n, x, y, z, t, u, v, w)
+    at, velocity = _leg_of(start, through, leg)
+    place(lanes, n, at, velocity)
     fly_for(lanes, n, duration[leg], dt)
     lanes[_LEG, n] = leg
 
@@ -35,10 +43,10 @@ def fly_legs(flow, start, through, duration, dt, end, first, last):
     while flying > 0:
         advance(flow, lanes)
         for n in range(LANES):
-            if lanes[LEFT, n] > 0.0:
+            if lanes[LANE_LEFT, n] > 0.0:
                 continue
             leg = int(lanes[_LEG, n])
-            end[leg, 0], end[leg, 1] = lanes[X, n], lanes[Y, n]
+            end[leg, 0], end[leg, 1] = lanes[LANE_X, n], lanes[LANE_Y, n]
             if waiting < last:
                 _take_off(start, through, duration, dt, waiting, lanes, n)
                 waiting += 1
@@ -55,8 +63,7 @@ def legs_fit(medium, start, through, duration, fits, first, last):
     """
     dt = medium.integration.dt
     for leg in range(first, last):
-        x, y, z, t = start[leg]
-        u, v, w = through[leg]
-        fits[leg] = stays_inside(medium.flow, x, y, z, t, u, v, w, duration[leg], dt) and is_clear(
-            medium.flow, medium.terrain, x, y, z, t, u, v, w, duration[leg], dt, CLEARANCE_SPACING
+        at, velocity = _leg_of(start, through, leg)
+        fits[leg] = stays_inside(medium.flow, at, velocity, duration[leg], dt) and is_clear(
+            medium.flow, medium.terrain, at, velocity, duration[leg], dt, CLEARANCE_SPACING
         )

@@ -30,14 +30,19 @@ the differences are good to six digits, and far above rounding."""
 class Glides(NamedTuple):
     """Exact legs between stops: magnitude of the glide angle, heading [rad] (n,), duration, departure [s] (n,).
 
-    `exact` (n,): whether a leg ends at its stop.
+    `miss` (n,) [m]: how far from its stop a leg ends.
     """
 
     angle: Array
     heading: Array
     time: Array
     departs: Array
-    exact: NDArray[np.bool_]
+    miss: Array
+
+    @property
+    def exact(self) -> NDArray[np.bool_]:
+        """Which legs (n,) end at their stops."""
+        return self.miss <= CLOSE
 
 
 class Slopes(NamedTuple):
@@ -56,9 +61,7 @@ class Air:
 
     evaluator: Evaluator
 
-    def glide(
-        self, begin: Array, end: Array, angle: Array, heading: Array, departs: float | Array
-    ) -> Glides:
+    def glide(self, begin: Array, end: Array, angle: Array, heading: Array, departs: float | Array) -> Glides:
         """The exact legs, from a guess of their controls [rad].
 
         `departs` [s] of each (n,), or of the first of a route, whose every leg leaves when the last one arrives.
@@ -75,8 +78,7 @@ class Air:
             ends = self._ends(np.stack([of, *(of + _step(n) for n in (ANGLE, HEADING))]), climbs)
             off = end[:, :2] - ends[0]
             miss = np.hypot(*off.T)
-            exact = miss <= CLOSE
-            if exact.all() or not np.isfinite(miss).any():
+            if (miss <= CLOSE).all() or not np.isfinite(miss).any():
                 break
             by_angle, by_heading = ((ends[1 + n] - ends[0]) / STEPS[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
@@ -84,7 +86,7 @@ class Air:
             longest = np.abs(turn).max(axis=1, initial=0.0)
             turn *= np.minimum(1.0, LONGEST_TURN / np.maximum(longest, LONGEST_TURN))[:, None]
             angle, heading = np.clip(angle + turn[:, 0], lowest, highest), heading + turn[:, 1]
-        return Glides(angle, heading, time, np.asarray(left), exact)
+        return Glides(angle, heading, time, np.asarray(left), miss)
 
     def slopes(self, begin: Array, end: Array, glides: Glides) -> Slopes:
         """The derivatives of exact legs, by flights beside them and the implicit function theorem."""
@@ -115,6 +117,12 @@ class Air:
         in_parallel(task, len(fits), LEGS_AT_ONCE)
         return fits
 
+    def along(self, begin: Array, end: Array, glides: Glides, share: float) -> Array:
+        """Where legs are (n, 3) [m] after a share of their times."""
+        climbs, height = end[:, 2] > begin[:, 2], begin[:, 2] + share * (end[:, 2] - begin[:, 2])
+        of = np.column_stack([begin, glides.departs, height, glides.angle, glides.heading])
+        return np.column_stack([self._ends(of[None], climbs)[0], height])
+
     def angles(self, climbs: NDArray[np.bool_]) -> tuple[Array, Array]:
         """The shallowest and the steepest glide of each leg [rad]."""
         way = climbs.astype(np.intp)
@@ -136,9 +144,7 @@ class Air:
 
     def _through(self, angle: Array, heading: Array, climbs: NDArray[np.bool_]) -> Array:
         along = self.speed(angle, climbs) * np.cos(angle)
-        return np.stack(
-            [along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1
-        )
+        return np.stack([along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1)
 
     def _ends(self, of: Array, climbs: NDArray[np.bool_]) -> Array:
         """Where legs of parameters (m, n, 7) end: (m, n, 2) [m]."""
@@ -148,9 +154,7 @@ class Air:
         time = (row[:, Z_END] - row[:, Z]) / through[:, 2]
         start = np.ascontiguousarray(row[:, [X, Y, Z, T]])
         ends = np.full((len(row), 2), np.nan)
-        task = partial(
-            fly_legs, self.evaluator.flow, start, through, time, self.evaluator.integration.dt, ends
-        )
+        task = partial(fly_legs, self.evaluator.flow, start, through, time, self.evaluator.integration.dt, ends)
         in_parallel(task, len(row), LEGS_AT_ONCE)
         return ends.reshape(*of.shape[:2], 2)
 

@@ -88,7 +88,8 @@ class Path:
     From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
     `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, and `why_not`, the same
     for JSON, if that is known; `notes` on files written of it.
-    `unthinned`: how many legs and seconds it had before it was thinned. `least_time` [s]: no path within the
+    `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds
+    and what cost before it was polished. `least_time` [s]: no path within the
     bound on energy that was asked for takes less.
     """
 
@@ -101,6 +102,7 @@ class Path:
     unit: str = "s"
     why: str = ""
     unthinned: tuple[int, float] | None = None
+    unpolished: tuple[int, float, float] | None = None
     least_time: float | None = None
     why_not: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
@@ -132,12 +134,19 @@ class Path:
             "cost": self.cost if self.found else None,
             **energy,
             **thinned,
+            **self._before_polishing(),
             **({} if self.least_time is None else {"least_time_s": self.least_time}),
             **({} if self.found or not self.why else {"why": self.why}),
             **({} if self.why_not is None else {"why_not": dict(self.why_not)}),
             **({"notes": list(self.notes)} if self.notes else {}),
             "legs": [leg.as_dict() for leg in self.legs],
         }
+
+    def _before_polishing(self) -> dict[str, Any]:
+        if self.unpolished is None:
+            return {}
+        legs, time, cost = self.unpolished
+        return {"unpolished": {"legs": legs, "travel_time_s": time, "cost": cost}}
 
     def __str__(self) -> str:
         if self.lonlat is None:
@@ -156,6 +165,10 @@ class Path:
             title += f"; no path within the bound takes less than {span(self.least_time)}"
         if self.unthinned is not None:
             title += f"; before it was thinned {self.unthinned[0]}, {span(self.unthinned[1])}"
+        if self.unpolished is not None:
+            legs, time, cost = self.unpolished
+            title += f"; before it was polished {legs}, {span(time)}"
+            title += f", {cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         return "\n".join([title, *(f"  {leg.told(self.departs)}" for leg in self.legs)])
 
 

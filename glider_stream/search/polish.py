@@ -8,7 +8,7 @@ the diagonal, since a stop meets two legs alone. Every iterate is a route that c
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,25 +19,29 @@ from ..base.arrays import Array
 from ..kernels.edges import Edge, Status
 from ..roadmap.problem import Problem
 from .glides import Air, Glides, Slopes
-from .path import SURFACE, Hop, Path
+from .path import Hop, Path
 
 LEAST_RISE = 2.0
 """A polished leg dives or climbs so far at least [m]: a shorter one is no glide."""
-BARRIER = 1e-4
-"""Weight of the barrier that keeps legs off the ends of the glide polar, of the horizon and of LEAST_RISE, in
-shares of the route's cost: it moves an optimum away from such an end by about so much."""
-LAST_BARRIER = 1e-6
-"""The barrier of the last steps."""
+BARRIERS = (1e-4, 5e-6)
+"""Weights, in turn, of the barrier that keeps legs off the ends of the glide polar, of the horizon and
+of LEAST_RISE, in shares of the route's cost: it moves an optimum away from such an end by about so much."""
+NEARER = 0.1
+"""In one step a leg comes nearer to such an end to this share of its distance at most."""
 CURVED = (20.0, 20.0, 8.0)
-"""By how much a stop is moved to measure second derivatives, along x, y, z [m]: wide enough to look over the kinks
-of a grid, where first derivatives bend."""
-ENOUGH = 3e-6
-"""A step that gains a smaller share of the cost is the last one."""
+"""By how much a stop is moved to measure second derivatives, along x, y, z [m]: wide enough to look over
+the kinks of a grid, where first derivatives bend."""
+ENOUGH = 3e-5
+"""A step that gains a smaller share of the cost is a small one."""
+SMALL_STEPS = 2
+"""So many small steps, one after the other, are the last ones: a single one may lie at a kink."""
 MOST_MOVES = 30
-SHORTENED = 8
+SHORTENED = 6
 """How often a step is halved where its route cannot be flown or gains nothing."""
 DAMPED, FREED = 10.0, 0.1
 """Factors of the damping where a step fails, and where it does not."""
+STIFF = 1e3
+"""Damping that moves nothing any more."""
 FAR = 0.5
 """A stop moves at most so much of the longer of its legs in one step."""
 
@@ -73,6 +77,26 @@ class Polisher:
             return None
         return Chain(stops, glides, self.cost(stops, glides))
 
+    def chain_of(self, path: Path) -> Chain | None:
+        """A path as it is polished: its legs end exactly, each leaves when the last one arrives."""
+        stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)])
+        angle = np.array([abs(leg.glide_angle) for leg in path.legs])
+        return self.chain(stops, angle, np.array([leg.heading for leg in path.legs]))
+
+    def hops(self, chain: Chain) -> list[Hop]:
+        """The legs of a route, for a path to be made of."""
+        stops, glides, price = chain.stops, chain.glides, self.problem.evaluator.cost.kernel()
+        climbs = np.diff(stops[:, 2]) > 0
+        speed = self.air.speed(glides.angle, climbs)
+        legs = []
+        for n, time in enumerate(glides.time.tolist()):
+            angle = float(glides.angle[n] if climbs[n] else -glides.angle[n])
+            heading = math.remainder(float(glides.heading[n]), math.tau)
+            cost = price.per_second * time + price.per_leg
+            control = angle, heading, float(speed[n]), float(glides.miss[n])
+            legs.append((stops[n], stops[n + 1], Edge(int(Status.CONNECTED), time, cost, *control)))
+        return legs
+
     def cost(self, stops: Array, glides: Glides) -> float:
         """The scenario's own cost of a route, its turns included."""
         price = self.problem.evaluator.cost.kernel()
@@ -81,40 +105,43 @@ class Polisher:
 
     def polish(self, chain: Chain) -> Chain:
         """Newton's method on the stops between start and goal."""
-        weight, damping = BARRIER, 1e-3
-        for _ in range(MOST_MOVES):
-            if len(chain.stops) <= 2:
-                break
-            step = _Step.of(self, chain, weight * chain.cost)
-            better = None
-            while better is None and damping < 1e6:
-                better = self._along(chain, step.move(damping), weight * chain.cost)
-                damping *= DAMPED if better is None else FREED
-            damping = max(damping, 1e-6)
-            gain = 0.0 if better is None else self.merit(chain, weight * chain.cost) - self.merit(
-                better, weight * chain.cost
-            )
-            if better is not None:
-                chain = better
-            if gain < ENOUGH * chain.cost:
-                if weight == LAST_BARRIER:
+        for weight in BARRIERS:
+            damping, small = 1e-3, 0
+            for _ in range(MOST_MOVES if len(chain.stops) > 2 else 0):
+                better, damping = self._step(chain, weight * chain.cost, damping)
+                if better is None:
                     break
-                weight, damping = LAST_BARRIER, 1e-3
+                gain, chain = chain.cost - better.cost, better
+                small = small + 1 if abs(gain) < ENOUGH * chain.cost else 0
+                if small == SMALL_STEPS:
+                    break
         return chain
+
+    def _step(self, chain: Chain, weight: float, damping: float) -> tuple[Chain | None, float]:
+        """A Newton step, damped as far as it must be: a better route, if there is one, and the next damping."""
+        step = _Step.of(self, chain, weight)
+        while damping < STIFF:
+            better = self._along(chain, step.move(damping), weight)
+            if better is not None:
+                return better, max(damping * FREED, 1e-6)
+            damping *= DAMPED
+        return None, damping
 
     def merit(self, chain: Chain, weight: float) -> float:
         """The cost and the barrier."""
         room, _ = self._room(chain.stops, chain.glides, None)
-        return chain.cost - weight * float(np.log(np.maximum(room, 1e-12)).sum())
+        return chain.cost - weight * float(np.log(room).sum())
 
     def _along(self, chain: Chain, move: Array, weight: float) -> Chain | None:
         """A better route along a move of the stops (n + 1, 3); stops whose legs cannot be flown move less."""
         before, share = self.merit(chain, weight), np.ones(len(chain.stops))
+        room = self._room(chain.stops, chain.glides, None)[0]
         for _ in range(SHORTENED):
             stops = self._held(chain.stops + share[:, None] * move)
             stops = np.where((share > 0)[:, None], stops, chain.stops)
             glides = self.glide(stops, chain.glides.angle, chain.glides.heading)
-            bad = ~(glides.exact & self._within(stops, glides))
+            bad = ~self._within(stops, glides)
+            bad |= (self._room(stops, glides, None)[0] < NEARER * room).any(axis=1)
             if bad.any():
                 at = np.zeros(len(stops), np.bool_)
                 at[:-1] |= bad
@@ -138,12 +165,10 @@ class Polisher:
         short = np.abs(np.diff(stops[:, 2])) < min(LEAST_RISE, 0.5)
         late = glides.time > integration.dt * integration.steps
         fits = glides.exact & ~short & ~late & np.isfinite(glides.time)
-        if fits.all():
-            fits &= self.air.fit(stops[:-1], stops[1:], glides)
-        return np.asarray(fits)
+        return self.air.fit(stops[:-1], stops[1:], glides) if fits.all() else np.asarray(fits, np.bool_)
 
     def _room(self, stops: Array, glides: Glides, slopes: Slopes | None) -> tuple[Array, Array]:
-        """How far legs are from what they must keep (n, 4), in shares; its derivatives (n, 4, 6) by their ends."""
+        """How far legs are from what they must keep (n, 4), in shares; its slopes (n, 4, 6) by their ends."""
         rise = np.diff(stops[:, 2])
         climbs = rise > 0
         lowest, highest = self.air.angles(climbs)
@@ -165,7 +190,7 @@ class Polisher:
             by[:, 1] = -by[:, 0]
             by[:, 2] = -slopes.time[:, :6] / horizon
             by[:, 3, 2], by[:, 3, 5] = -np.sign(rise) / depth, np.sign(rise) / depth
-        return np.maximum(room, 0.0) + 1e-4, by
+        return np.maximum(room, 0.0) + 1e-7, by
 
     def _turns(self, stops: Array) -> NDArray[np.bool_]:
         """At which legs' starts (n,) a dive turns into a climb; a route begins as if it had dived."""
@@ -179,7 +204,7 @@ class Polisher:
 
 @dataclass(frozen=True)
 class _Step:
-    """Gradient (n - 1, 3) and second derivatives, banded, of a route's cost by its stops between; what is free."""
+    """Gradient (n - 1, 3) and second derivatives, banded, of a route's cost by its inner stops; what is free."""
 
     gradient: Array
     band: Array
@@ -219,8 +244,8 @@ class _Step:
                         band[3 + i - j, 3 * n + j] = bent[n + 1, 3 + i, j]
         lowest, highest = polisher.problem.lo[2], min(0.0, float(polisher.problem.hi[2]))
         between, free = stops[1:-1], np.ones_like(gradient, np.bool_)
-        down, up = between[:, 2] <= lowest + 1e-9, between[:, 2] >= highest - 1e-9
-        free[:, 2] = ~((down & (gradient[:, 2] > 0)) | (up & (gradient[:, 2] < 0)))
+        lies, floats = between[:, 2] <= lowest + 1e-9, between[:, 2] >= highest - 1e-9
+        free[:, 2] = ~((lies & (gradient[:, 2] > 0)) | (floats & (gradient[:, 2] < 0)))
         free[:, 2] &= ~np.array([polisher.stays(stop) for stop in between], np.bool_)
         length = np.abs(np.diff(stops, axis=0))
         reach = np.maximum(np.linalg.norm(length[:-1], axis=1), np.linalg.norm(length[1:], axis=1))
@@ -239,7 +264,8 @@ class _Step:
                 steps[n] = np.where(climbs == (n == 5), 1.0, -1.0) * np.minimum(steps[n], 0.2 * rise)
             moved[n, :, n] += steps[n]
         there = moved[..., :3].reshape(-1, 3), moved[..., 3:].reshape(-1, 3)
-        beside = polisher.air.glide(*there, *(np.tile(one, 6) for one in glides[:2]), np.tile(glides.departs, 6))
+        angle, heading, departs = (np.tile(one, 6) for one in (glides.angle, glides.heading, glides.departs))
+        beside = polisher.air.glide(*there, angle, heading, departs)
         change = polisher.air.slopes(*there, beside).time[:, :6].reshape(6, count, 6) - slopes.time[:, :6]
         change = np.where(beside.exact.reshape(6, count, 1), change / steps[..., None], 0.0)
         bent = change.transpose(1, 0, 2)
@@ -262,7 +288,7 @@ class _Step:
             except LinAlgError:
                 shift = max(2 * shift, 1e-2)
                 band[0] = np.where(free, band[0] + shift * np.maximum(scale, scale.mean()), 1.0)
-        step = step.reshape(-1, 3)
-        length = np.linalg.norm(step, axis=1)
-        step = step * np.minimum(1.0, self.longest / np.maximum(length, 1e-12))[:, None]
-        return np.concatenate([np.zeros((1, 3)), step, np.zeros((1, 3))])
+        move: Array = step.reshape(-1, 3)
+        length = np.linalg.norm(move, axis=1)
+        move = move * np.minimum(1.0, self.longest / np.maximum(length, 1e-12))[:, None]
+        return np.concatenate([np.zeros((1, 3)), move, np.zeros((1, 3))])
