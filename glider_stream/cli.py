@@ -2,13 +2,21 @@
 
 import json
 import os
+import re
 import sys
+import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .base.errors import InputError, Stopped
+from .base.errors import InputError, InputWarning, Stopped
+from .base.interrupt import STOPPED, stoppable
+from .base.terminal import plain, say, silence
+
+if TYPE_CHECKING:
+    from .opened import OpenedScenario
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
@@ -29,20 +37,31 @@ def place_and_time(text: str) -> tuple[Any, ...]:
 
 
 def key_and_value(text: str) -> tuple[str, Any]:
-    """A key, and its value: a whole number, or a text."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip() or not value.strip():
+    """A key, and its value: a number, or a text."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE, such as units=cm/s")
-    return key.strip(), int(value) if value.strip().isdecimal() else value.strip()
+    if value.isdecimal():
+        return key, int(value)
+    return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
 def _write_json(value: Any) -> None:
-    click.echo(json.dumps(value, indent=1))
+    say(json.dumps(value, indent=1))
 
 
+TRACE = "GLIDER_STREAM_TRACE"
+"""Name of the variable of the environment that shows the trace of an error of this program."""
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
+ELSEWHERE = click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="SECTION.KEY=FILE",
+    help="Where a file of ROADMAP's scenario is now, such as flow.file=currents.nc.",
+)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
@@ -56,14 +75,14 @@ def cli() -> None:
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-@click.option("--shard", metavar="K/N", help="Build part K of N alone, for `merge`.")
-@click.option("--restart", is_flag=True, help="Forget what a stopped build has kept, and begin anew.")
+@click.option("--shard", metavar="K/N", help="Build only part K of N, for `merge`.")
+@click.option("--restart", is_flag=True, help="Discard what a stopped build has kept, and begin again.")
 @click.option(
-    "--from", "base", type=FILE, metavar="OLD", help="Take over what a new current cannot have changed."
+    "--from", "base", type=FILE, metavar="OLD", help="Reuse the legs that a new current cannot have changed."
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Evaluate on a Dask cluster; local:N for N processes here.")
 @click.option(
-    "--checkpoint", type=float, metavar="SECONDS", help="How often the disk must keep it; 30 if not given."
+    "--checkpoint", type=float, metavar="SECONDS", help="Seconds between writes to disk; 30 if not given."
 )
 def build(
     scenario: str,
@@ -78,7 +97,7 @@ def build(
 ) -> None:
     """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
 
-    What is found is kept beside the output until it is whole: the same command goes on where it was stopped.
+    Results are kept beside the output until it is complete: the same command continues a stopped build.
     """
     from . import planner
     from .base.progress import reporter
@@ -99,9 +118,9 @@ def build(
         else:
             road = planner.build(scenario, output, progress=progress, **run)
             done, empty = str(road), planner.why_no_edges(road)
-    click.echo(f"{done}\n  file:   {output}")
+    say(f"{done}\n  file:   {output}")
     if empty:
-        click.echo(f"note: {empty}", err=True)
+        say(f"note: {empty}", error=True)
 
 
 @cli.command()
@@ -112,37 +131,83 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     from . import planner
 
     road = planner.merge(parts, output)
-    click.echo(f"{road}\n  file:   {output}")
+    say(f"{road}\n  file:   {output}")
     if empty := planner.why_no_edges(road):
-        click.echo(f"note: {empty}", err=True)
+        say(f"note: {empty}", error=True)
+
+
+ROUTE_OPTIONS = (
+    click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic."),
+    click.option("--goal", type=place, metavar="X,Y,Z", help="As --start."),
+    click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write."),
+    click.option(
+        "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
+    ),
+    click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most."),
+    click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most."),
+    click.option(
+        "--polish", is_flag=True, help="Move the stops off the nodes, cut legs, count yos anew, while it pays."
+    ),
+    click.option(
+        "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
+    ),
+    click.option(
+        "--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals."
+    ),
+    click.option(
+        "--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given."
+    ),
+    click.option(
+        "--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given."
+    ),
+    click.option(
+        "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
+    ),
+    click.option(
+        "--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead."
+    ),
+    click.option(
+        "--depart-between", nargs=2, metavar="A B", help="Try departures: seconds of the flow, or times (UTC)."
+    ),
+    click.option("--every", type=float, metavar="SECONDS", help="With --depart-between: how far they lie apart."),
+    click.option("--arrive-by", metavar="T", help="Find the latest departure that arrives by a time."),
+    click.option("--figure", type=FILE, help="Travel time and arrival against departure: PNG, SVG or PDF."),
+    JSON,
+)
+
+
+def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of what finds a route."""
+    for option in reversed(ROUTE_OPTIONS):
+        command = option(command)
+    return command
 
 
 @cli.command()
 @ROADMAP
-@click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic.")
-@click.option("--goal", type=place, metavar="X,Y,Z", help="As --start.")
-@click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write.")
-@click.option(
-    "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
-)
-@click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most.")
-@click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most.")
-@click.option(
-    "--polish", is_flag=True, help="Move its stops, cut its legs, count its yos anew: nothing near is better."
-)
-@click.option(
-    "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
-)
-@click.option("--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals.")
-@click.option("--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given.")
-@click.option("--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given.")
-@click.option(
-    "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
-)
-@click.option("--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead.")
-@JSON
-def query(
-    roadmap: Path,
+@ELSEWHERE
+@route_options
+def query(roadmap: Path, overrides: tuple[str, ...], **asked: Any) -> None:
+    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
+    from .opened import open
+
+    _answer(lambda: open(roadmap, overrides), **asked)
+
+
+@cli.command()
+@click.argument("scenario")
+@route_options
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
+    """Find a route of SCENARIO without a roadmap: each leg leaves when the last one arrives."""
+    from .opened import open_scenario
+
+    _answer(lambda: open_scenario(scenario, overrides), **asked)
+
+
+def _answer(
+    opened: "Callable[[], OpenedScenario]",
+    *,
     start: Any,
     goal: Any,
     outputs: tuple[Path, ...],
@@ -156,32 +221,47 @@ def query(
     waypoints: int | None,
     arrival_radius: float | None,
     front: bool,
+    depart_between: tuple[str, str] | None,
+    every: float | None,
+    arrive_by: str | None,
+    figure: Path | None,
     as_json: bool,
 ) -> None:
-    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
-    from .opened import open
+    """Print what was asked for of a roadmap or a scenario; exit code 1 where there is no path."""
     from .pilot.export import check_export
     from .search.surfacing import Surfacing
 
     free = most_yos is None and most_hours is None
     rule = None if free else Surfacing(most_yos, most_hours)
-    said: Any
+    departures = depart_between is not None or arrive_by is not None
+    answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    alone = not (outputs or polish or asked or as_card) and most_energy is None and thin is None
+    if front and (departures or not alone):
+        raise click.UsageError(
+            "--trade-off goes with none of --output, --most-energy, --polish, --thin, --card, "
+            "--window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one of them out"
+        )
+    if departures and not alone:
+        raise click.UsageError(
+            "--depart-between and --arrive-by go with none of --output, --most-energy, --polish, --thin, "
+            "--card, --window-hours, --waypoints and --arrival-radius; set query.departure to what they find"
+        )
+    if not departures and (every is not None or figure is not None):
+        raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
     if front:
-        alone = not outputs and most_energy is None and not polish and thin is None and not asked and not as_card
-        if not alone:
-            raise click.UsageError(
-                "--trade-off goes with none of --output, --most-energy, --polish, --thin, --card, "
-                "--window-hours, --waypoints and --arrival-radius; leave one of them out"
-            )
-        corners = open(roadmap).trade_off(start, goal, surfacing=rule)
-        said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+        corners = opened().trade_off(start, goal, surfacing=rule)
+        answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+    elif departures:
+        ends: dict[str, Any] = {"start": start, "goal": goal, "surfacing": rule}
+        answer = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
+        found = answer.found
     else:
         for output in outputs:
             check_export(output)
-        road = open(roadmap)
-        path = road.query(
+        source = opened()
+        path = source.query(
             start,
             goal,
             outputs=outputs,
@@ -192,12 +272,12 @@ def query(
             **asked,
         )
         for note in path.notes:
-            click.echo(f"note: {note}", err=True)
-        said, found = road.card(path) if as_card and path.found else path, path.found
+            say(f"note: {note}", error=True)
+        answer, found = source.card(path) if as_card and path.found else path, path.found
     if as_json:
-        _write_json(said.as_dict())
+        _write_json(answer.as_dict())
     else:
-        click.echo(said, err=not found)
+        say(answer, error=not found)
     if not found:
         sys.exit(1)
 
@@ -212,45 +292,65 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
     """Say what ROADMAP holds."""
     from . import planner
 
-    said = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
+    answer = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
     if as_json:
-        _write_json(said.as_dict())
+        _write_json(answer.as_dict())
     else:
-        click.echo(said)
+        say(answer)
 
 
 @cli.command()
 @ROADMAP
+@ELSEWHERE
 @click.option("--sample", type=int, default=200, show_default=True, help="Edges for DOP853; 0 for all.")
 @JSON
-def verify(roadmap: Path, sample: int, as_json: bool) -> None:
-    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if it is not what it says."""
+def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool) -> None:
+    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if a leg differs."""
     from . import planner
 
-    verification = planner.verify(roadmap, sample)
+    verification = planner.verify(roadmap, sample, overrides=overrides)
     if as_json:
         _write_json(verification.as_dict())
     else:
-        click.echo(verification)
+        say(verification)
     if not verification.holds:
         sys.exit(1)
 
 
 @cli.command()
 @ROADMAP
-@click.argument("path", required=False, type=FILE)
+@ELSEWHERE
+@click.argument("paths", nargs=-1, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
-@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
+@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for one route.")
 @click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
-@click.option("--fronts", type=float, metavar="HOURS", help="As --chart, with what is reached every HOURS.")
+@click.option("--fronts", type=float, metavar="HOURS", help="A chart, with what is reached every HOURS.")
 def plot(
-    roadmap: Path, path: Path | None, output: Path, depths: tuple[float, ...], chart: bool, fronts: float | None
+    roadmap: Path,
+    overrides: tuple[str, ...],
+    paths: tuple[Path, ...],
+    output: Path,
+    depths: tuple[float, ...],
+    chart: bool,
+    fronts: float | None,
 ) -> None:
-    """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
+    """Draw the route in PATHS (JSON, from query) over ROADMAP's current; without PATHS, the roadmap.
+
+    Two to four files are drawn side by side, to compare the routes.
+    """
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts)
-    click.echo(output)
+    if len(paths) > 1:
+        if chart or fronts is not None or len(depths) > 1:
+            raise click.UsageError(
+                "several routes go with one --depth, and without --chart and --fronts; leave these out, or "
+                "give one route"
+            )
+        planner.plot_routes(roadmap, paths, output, depths[0] if depths else None, overrides=overrides)
+    else:
+        path = paths[0] if paths else None
+        planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts, overrides=overrides)
+    say(output)
 
 
 @cli.command()
@@ -274,33 +374,34 @@ def plot(
 def describe(
     currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
 ) -> None:
-    """Say what the current files CURRENTS hold, and what the planner takes for what."""
+    """Say what the current files CURRENTS hold, and how the planner reads them."""
     from . import planner
 
     description = planner.describe(currents, [(*place, None)[:4] for place in at], dict(names))
     if as_json:
         _write_json(description.as_dict())
     else:
-        click.echo(description)
+        say(description)
 
 
 @cli.command()
 @ROADMAP
+@ELSEWHERE
 @click.argument("route", nargs=-1, required=True, type=FILE)
 @click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
 @JSON
-def score(roadmap: Path, route: tuple[Path, ...], start: Any, as_json: bool) -> None:
-    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails.
+def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], start: Any, as_json: bool) -> None:
+    """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails.
 
     CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
     """
-    from . import planner
+    from .opened import open_either
 
-    found = planner.score(roadmap, route, start)
+    found = open_either(roadmap, overrides).score(route, start)
     if as_json:
         _write_json(found.as_dict())
     else:
-        click.echo(found, err=not found.flyable)
+        say(found, error=not found.flyable)
     if not found.flyable:
         sys.exit(1)
 
@@ -317,7 +418,7 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
     if as_json:
         _write_json([one.as_dict() for one in looked])
     else:
-        click.echo("\n".join(map(str, looked)))
+        say("\n".join(map(str, looked)))
     if any(one.faults for one in looked):
         sys.exit(1)
 
@@ -331,7 +432,7 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
     multiple=True,
     type=key_and_value,
     metavar="WHAT=COLUMN",
-    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase, called otherwise.",
+    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase: its column.",
 )
 @click.option("-o", "--output", type=FILE, help="A TOML file for the [glider] section to write.")
 @JSON
@@ -341,17 +442,19 @@ def calibrate(
     """Fit buoyancy or drag of a vehicle, and its lift, to DIVES: a CSV file of what it flew."""
     from . import planner
 
-    found = planner.calibrate(dives, output, preset=preset, columns={name: str(own) for name, own in columns})
+    found = planner.calibrate(
+        dives, output, preset=preset, columns={name: str(column) for name, column in columns}
+    )
     if as_json:
         _write_json(found.as_dict())
     else:
-        click.echo(found)
+        say(found)
 
 
 @cli.command()
 @click.option("--runs", type=int, help="How often each figure is measured; 5 if not given.")
 @click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
-@click.option("--only", multiple=True, metavar="PART", help="Parts, or problems of the suite; see README.")
+@click.option("--only", multiple=True, metavar="PART", help="Only these parts, or problems of the suite.")
 @click.option("--suite", is_flag=True, help="Solve the named problems instead, by every method and baseline.")
 @click.option("--ompl", type=FILE, help="With --suite: a folder for logs that OMPL's tools read.")
 @click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
@@ -367,7 +470,7 @@ def bench(
     against: Path | None,
     output: Path | None,
 ) -> None:
-    """Measure what this machine does, or how good routes are; the full run must be alone on it."""
+    """Measure what this machine does, or how good routes are; nothing else may run meanwhile."""
     from . import planner
 
     if suite:
@@ -380,25 +483,35 @@ def bench(
             ompl=ompl,
             quick=quick,
             only=only,
-            progress=lambda said: click.echo(f"suite: {said}", err=True),
+            progress=lambda message: say(f"suite: {message}", error=True),
         )
-        click.echo(report)
+        say(report)
         return
     if ompl is not None:
-        raise click.UsageError("--ompl goes with --suite alone; add that or leave it out")
+        raise click.UsageError("--ompl needs --suite; add it, or leave --ompl out")
     record, moved = planner.bench(
         output, against=against, runs=5 if runs is None else runs, quick=quick, only=only, ceiling=ceiling,
-        progress=lambda figure: click.echo(f"bench: {figure}", err=True),
+        progress=lambda figure: say(f"bench: {figure}", error=True),
     )  # fmt: skip
-    click.echo(record)
+    say(record)
     if against is not None:
-        click.echo("\n".join(["moved beyond both spreads:", *(f"  {line}" for line in moved or ["nothing"])]))
+        say("\n".join(["moved beyond both spreads:", *(f"  {line}" for line in moved or ["nothing"])]))
 
 
 def main() -> None:
-    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input."""
+    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input, 3 an error of this program."""
+    if hasattr(sys.stdout, "reconfigure"):
+        # a name that is no UTF-8, or a letter that an old terminal lacks, is written as \\udcff
+        sys.stdout.reconfigure(errors="backslashreplace")
+    os.environ["MPLBACKEND"] = "agg"  # a notebook's own draws nothing into files
+    with stoppable():
+        _run()
+
+
+def _run() -> None:
     try:
         _check_environment()
+        _show_warnings()
         cli(prog_name="glider-stream", standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
@@ -409,16 +522,38 @@ def main() -> None:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         if error.filename is None:
-            # what is written to files names them: this is standard output, and what waits there goes nowhere
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            silence(sys.stdout)  # what is written to files names them: this is standard output
         _refuse(f"{error.filename or 'standard output'} cannot be used: {reason}; name another")
     except MemoryError as error:
         _refuse(f"there is not enough memory ({error}); make the problem smaller")
     except (click.Abort, KeyboardInterrupt) as error:
         # click makes an Abort of a KeyboardInterrupt
         stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
-        click.echo(f"glider-stream: {stopped}", err=True)
-        sys.exit(130)
+        say(f"glider-stream: {plain(str(stopped))}", error=True)
+        sys.exit(STOPPED)
+    except Exception as error:
+        if os.environ.get(TRACE):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        say(
+            f"glider-stream: an error of this program, and not of your input: {what}; "
+            f"please report it, with what {TRACE}=1 in the environment shows",
+            error=True,
+        )
+        sys.exit(3)
+
+
+def _show_warnings() -> None:
+    """Warnings on input in one line, without the place in this program."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+        if issubclass(category, InputWarning):
+            say(f"glider-stream: warning: {message}", error=True)
+        else:
+            usual(message, category, *rest, **named)
+
+    warnings.showwarning = show
 
 
 def _check_environment() -> None:
@@ -430,5 +565,5 @@ def _check_environment() -> None:
 
 
 def _refuse(sentence: str) -> None:
-    click.echo(f"glider-stream: {' '.join(sentence.split())}", err=True)
+    say(f"glider-stream: {plain(' '.join(sentence.split()))}", error=True)
     sys.exit(2)

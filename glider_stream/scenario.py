@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from datetime import UTC, date, datetime, timedelta
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,13 +14,15 @@ from .base.arrays import Array
 from .base.checks import FASTEST, LONGEST
 from .base.errors import InputError
 from .base.settings import from_kinds, from_table, require
-from .base.toml import to_toml
+from .base.toml import check_depth, to_toml
 from .kernels.flow import Flow
 from .kernels.terrain import OpenWater, Seabed, Terrain
 from .roadmap.evaluator import Evaluator
+from .roadmap.inputs import KEYS, located, names_of, renamed
 from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
+from .roadmap.roadmap import Roadmap
 from .roadmap.steering import METHODS, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
@@ -29,7 +31,7 @@ from .vehicle.presets import glider_from_table
 from .water.analytic import FLOWS, AnalyticFlow
 from .water.domain import BoxDomain, GeographicDomain, Point, domain_from_table
 from .water.inspect import divergence_ratio, is_steady
-from .water.ocean import OceanFlow
+from .water.ocean import OceanFlow, parse_time
 from .water.ocean.bottom import Bottom
 from .water.sampled import sample_flow, sampling_error
 from .water.terrain import TerrainSettings, raster_terrain
@@ -50,7 +52,7 @@ OPTIONAL = ("terrain", "query")
 
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
-FILES = {"file", "bathymetry", "keep_out"}
+FILES = {key for keys in KEYS.values() for key in keys}
 """Keys whose values name files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
@@ -64,9 +66,12 @@ KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
 
 @dataclass(frozen=True)
 class QueryPoints:
-    """`start` and `goal` in the domain's coordinates; gliders leave every node at `departure` [s].
+    """`start` and `goal` in the domain's coordinates; a route leaves at `departure` [s].
 
-    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule.
+    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule. In a flow that changes
+    each leg leaves when the last one arrives, but for `frozen`: then all meet the current of the departure.
+    `bins` [s]: ways to a node that arrive in different bins of time are kept side by side, where leaving later
+    may arrive earlier.
     """
 
     start: Point
@@ -74,15 +79,25 @@ class QueryPoints:
     departure: float = 0.0
     most_yos: int | None = None
     most_hours: float | None = None
+    frozen: bool = False
+    bins: float | None = None
 
     def __post_init__(self) -> None:
+        fits = self.bins is None or 0 < self.bins <= LONGEST
+        require(fits, f"`query.bins` must be above 0 s, {LONGEST:g} at most; got {self.bins}")
         fits = abs(self.departure) <= LONGEST
         require(fits, f"`query.departure` must be within {LONGEST:g} s of 0; got {self.departure:g}")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """One block each; `text` is the resolved TOML."""
+    """A problem as the TOML file describes it: one object for each section; `text` is the resolved TOML.
+
+    Examples:
+        >>> scenario = glider_stream.read_scenario("seed-box")
+        >>> scenario.query.start, scenario.sampler
+        ((-450.0, 450.0, 0.0), GridSampler(shape=(16, 16, 4)))
+    """
 
     domain: BoxDomain | GeographicDomain
     flow: AnalyticFlow | OceanFlow
@@ -101,7 +116,7 @@ class Scenario:
         lo, hi = self.domain.box()
         table, frame = polar(self.glider), self.domain.frame()
         horizon = self.integration.dt * self.integration.steps
-        flow, terrain, words = self._waters(float(table.best_horizontal.max()) * horizon, horizon)
+        flow, terrain, text = self._waters(float(table.best_horizontal.max()) * horizon, horizon)
         known = flow.extent
         times = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
         within = known.t_lo <= self.departure <= known.t_hi
@@ -109,15 +124,15 @@ class Scenario:
         fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {known.max_speed:g}; mend [flow]"
         require(known.max_speed <= FASTEST, fast)
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
-        words += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
+        text += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
-            words += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
+            text += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
         sampler = self.sampler
         if isinstance(sampler, YoSampler):
             sampler = sampler.for_glide(float(table.best_angle.max()))
         if frame is not None and isinstance(self.domain, GeographicDomain):
             error = frame.scale_error(self.domain.lon, self.domain.lat)
-            words += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
+            text += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
         return Problem(
             evaluator=Evaluator(flow, terrain, table, self.method, self.integration, self.cost),
             sampler=sampler,
@@ -128,10 +143,12 @@ class Scenario:
             start=None if self.query is None else self.domain.point(self.query.start),
             goal=None if self.query is None else self.domain.point(self.query.goal),
             scenario=self.text,
-            flow_words=words,
+            flow_words=text,
             glider_words=str(self.glider),
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
             departs=self._departs(),
+            frozen=self.query is not None and self.query.frozen,
+            bins=None if self.query is None else self.query.bins,
             domain=self.domain,
         )
 
@@ -144,9 +161,8 @@ class Scenario:
         """When gliders leave, by the calendar, where the flow says when t = 0 is."""
         if not isinstance(self.flow, OceanFlow) or self.flow.epoch is None:
             return None
-        epoch = datetime.fromisoformat(self.flow.epoch.strip())
-        utc = epoch.replace(tzinfo=UTC) if epoch.tzinfo is None else epoch.astimezone(UTC)
-        return utc + timedelta(seconds=self.departure)
+        epoch = parse_time(self.flow.epoch, "`flow.epoch`").item()
+        return cast(datetime, epoch).replace(tzinfo=UTC) + timedelta(seconds=self.departure)
 
     def _waters(self, glide: float, horizon: float) -> tuple[Flow, Terrain, str]:
         """Flow and terrain; `glide` [m] is how far a glider gets in still water within the horizon [s]."""
@@ -157,11 +173,11 @@ class Scenario:
             )
             assert isinstance(self.domain, GeographicDomain)
             domain, frame = self.domain, self.domain.frame()
-            ocean, bottom, said = self.flow.waters(frame, domain.lon, domain.lat, domain.depth)
+            ocean, bottom, description = self.flow.waters(frame, domain.lon, domain.lat, domain.depth)
             known = ocean.extent
             rim = np.array([known.x_lo, known.y_lo]), np.array([known.x_hi, known.y_hi])
             seabed, also = self._grounds(rim, [bottom])
-            return ocean, seabed, f"{said}; {also}"
+            return ocean, seabed, f"{description}; {also}"
         lo, hi = self.domain.box()
         flow = self.flow.kernel((lo[2], hi[2]))
         if self.flow.sampled is not None:
@@ -169,7 +185,7 @@ class Scenario:
             stray = (glide + flow.extent.max_speed * horizon) / 2
             x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
             exact, flow = flow, sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
-        words = next(name for name, one in FLOWS.items() if one is type(self.flow))
+        text = next(name for name, kind in FLOWS.items() if kind is type(self.flow))
         if self.flow.sampled is not None:
             known = flow.extent
             box = (
@@ -178,20 +194,20 @@ class Scenario:
             )
             off = sampling_error(exact, flow, *box, (lo[2], hi[2]))
             spacing = ", ".join(f"{step:g}" for step in self.flow.sampled)
-            words += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
+            text += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
         if self.terrain == TerrainSettings():
-            return flow, OpenWater(-np.inf), words
+            return flow, OpenWater(-np.inf), text
         if self.terrain == TerrainSettings(max_depth=self.terrain.max_depth):
-            return flow, OpenWater(-float(self.terrain.max_depth or np.inf)), words
+            return flow, OpenWater(-float(self.terrain.max_depth or np.inf)), text
         wide = (glide + flow.extent.max_speed * horizon) / 2
         seabed, also = self._grounds((lo[:2] - wide, hi[:2] + wide), [])
-        return flow, seabed, f"{words}; {also}"
+        return flow, seabed, f"{text}; {also}"
 
     def _grounds(self, box: tuple[Array, Array], bottoms: list[Bottom]) -> tuple[Seabed, str]:
         """The terrain of a geographic domain over a box [m], of what is known and what is asked for."""
         require(
             isinstance(self.domain, GeographicDomain),
-            "[terrain] needs a domain in `lon`, `lat` and `depth`, but for `max_depth`; got x, y, z",
+            "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
         )
         assert isinstance(self.domain, GeographicDomain)
         domain, frame, asked = self.domain, self.domain.frame(), self.terrain
@@ -200,13 +216,18 @@ class Scenario:
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
-            words = asked.variable, asked.positive
-            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *words)]
-        return raster_terrain(asked, frame, *box, bottoms)
+            text = asked.variable, asked.positive, asked.names
+            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *text)]
+        return raster_terrain(asked, frame, *box, bottoms, domain.box())
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package, by name."""
+    """The scenarios that come with the package, by name.
+
+    Examples:
+        >>> "seed-box" in glider_stream.shipped_scenarios()
+        True
+    """
     folder = Path(str(files("glider_stream"))) / "data"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -215,14 +236,22 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """A scenario from a TOML file, or a shipped one by its name.
 
     `overrides` are section.key=value each. Where they choose another kind of a section, the keys of the old
-    kind that the new one does not know are dropped, but for those overridden themselves. File names in the
+    kind that the new one does not know are dropped, unless they are overridden, too. File names in the
     scenario are relative to its folder, in overrides to the working directory.
+
+    Examples:
+        >>> scenario = glider_stream.read_scenario("seed-box", ["steering.method=flow-map"])
+        >>> scenario.domain.z
+        (-300.0, 0.0)
     """
     path = Path(name)
     if not path.is_file() and str(name) in shipped_scenarios():
         path = shipped_scenarios()[str(name)]
     shipped = ", ".join(shipped_scenarios())
-    require(path.is_file(), f"the scenario {name} is no file, and none of those shipped: {shipped}")
+    require(
+        path.is_file(),
+        f"the scenario {name} is neither a file nor a shipped scenario; choose a file, or one of: {shipped}",
+    )
     try:
         # some editors begin a file with a byte order mark
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
@@ -232,16 +261,42 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as such") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"the scenario {name} is not valid TOML: {error}; mend that place") from None
+    check_depth(table, f"the scenario {name}")
     _override(table, overrides)
+    check_depth(table, "`--set`")
     return scenario_from_table(table, path.parent)
 
 
 def scenario_from_text(text: str) -> Scenario:
     """The scenario that a roadmap carries."""
     try:
-        return scenario_from_table(tomllib.loads(text), Path())
-    except tomllib.TOMLDecodeError as error:
+        table = tomllib.loads(text)
+        check_depth(table, "the roadmap's scenario")
+        return scenario_from_table(table, Path())
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"the roadmap's scenario is not valid TOML: {error}") from None
+
+
+def scenario_of(road: Roadmap) -> Scenario:
+    """The scenario that a roadmap carries, its files found again where they or the roadmap have moved."""
+    text = road.provenance.scenario
+    try:
+        table: dict[str, Any] = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return scenario_from_text(text)
+    check_depth(table, "the roadmap's scenario")
+    names, beside = names_of(table), Path() if road.file is None else road.file.absolute().parent
+    given: dict[str, tuple[str, ...]] = {}
+    for override in road.elsewhere:
+        place = override.partition("=")[0].strip()
+        choices = " or ".join(names) or "which has none"
+        require(place in names, f"`--set` names a file of the roadmap's scenario, {choices}; got {override!r}")
+        _set(table, override)
+        section, key = place.split(".")
+        table[section] |= _located({key: table[section][key]}, Path())
+        given[place] = names_of(table)[place]
+    asked = {place: some for place, some in names.items() if place not in given}
+    return scenario_from_table(renamed(table, located(asked, road.provenance.inputs, beside)), Path())
 
 
 def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
@@ -287,6 +342,10 @@ def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         names = table[key] if several else [table[key]]
         if isinstance(names, list) and all(isinstance(name, str) for name in names):
             found = [str((folder / name).absolute()) for name in names]
+            for name in found:
+                # a roadmap keeps it as text
+                utf_8 = not any("\ud800" <= letter <= "\udfff" for letter in name)
+                require(utf_8, f"`{key}` = {name!r} is a name that is not UTF-8; rename the file, or its folder")
             result[key] = found if several or key != "bathymetry" else found[0]
     return result
 
@@ -325,6 +384,6 @@ def _set(table: dict[str, Any], override: str) -> list[str]:
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         section = isinstance(table, dict)
-        require(section, f"`--set` takes section.key=value, and `{key}` is no section; got {override!r}")
+        require(section, f"`--set` takes section.key=value, and `{key}` is not a section; got {override!r}")
     table[keys[-1]] = value
     return keys

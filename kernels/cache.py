@@ -1,9 +1,11 @@
 """How kernels are compiled; the disk cache of entry points, keyed by the text of every kernel."""
 
+import contextlib
 import hashlib
 import os
+import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,21 +27,52 @@ KERNEL_DIGEST = _digest()
 """SHA-256 of all kernel sources: part of the cache's place, and stored in every roadmap."""
 
 
-def _writable(folder: Path) -> bool:
+def _usable(folder: Path) -> bool:
+    """Whether compiled code can be kept in a folder, and nobody else can have put any there."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        # Python's own folder is read by all users; ours is not
+        private = 0o777 if folder.parent.name == "__pycache__" else 0o700
+        folder.parent.mkdir(parents=True, exist_ok=True, mode=private)
+        folder.mkdir(exist_ok=True, mode=0o700)
+        if not trusted(folder):
+            return False
         tempfile.TemporaryFile(dir=folder).close()
     except OSError:
         return False
     return True
 
 
+def trusted(folder: Path) -> bool:
+    """Whether a folder is ours, and no other user can write there or put another folder in its place.
+
+    What is loaded from it runs with our rights. Windows keeps users apart by other means.
+    """
+    if os.name == "nt":
+        return True
+    me, shared = os.geteuid(), stat.S_IWGRP | stat.S_IWOTH
+    itself, parent = folder.lstat(), folder.parent.stat()
+    # in a folder with the sticky bit, such as /tmp, only the owner of an item moves it
+    kept = not parent.st_mode & shared or bool(parent.st_mode & stat.S_ISVTX)
+    mine = stat.S_ISDIR(itself.st_mode) and itself.st_uid == me and not itself.st_mode & shared
+    return mine and kept and parent.st_uid in (0, me)
+
+
+def _places() -> Iterator[Path]:
+    """Folders for compiled kernels, the best first."""
+    if config.CACHE_DIR:
+        yield Path(config.CACHE_DIR)
+    yield Path(__file__).parent / "__pycache__"
+    # an account without a home, as in a container, has no answer
+    with contextlib.suppress(RuntimeError):
+        yield Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "glider-stream"
+    with contextlib.suppress(OSError):
+        user = os.geteuid() if os.name != "nt" else "cache"
+        yield Path(tempfile.gettempdir()) / f"glider-stream-{user}"
+
+
 def cache_folder() -> Path | None:
-    """Where compiled kernels of this digest are kept; None where no place can be written."""
-    places = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
-    places += [Path(__file__).parent / "__pycache__"]
-    places += [Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "glider-stream"]
-    return next((p / KERNEL_DIGEST[:16] for p in places if _writable(p / KERNEL_DIGEST[:16])), None)
+    """Where compiled kernels of this digest are kept; None where no place can be written and trusted."""
+    return next((place / KERNEL_DIGEST[:16] for place in _places() if _usable(place / KERNEL_DIGEST[:16])), None)
 
 
 ARITHMETIC: dict[str, Any] = {"error_model": "numpy"}

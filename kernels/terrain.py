@@ -18,7 +18,8 @@ class OpenWater(NamedTuple):
 class Seabed(NamedTuple):
     """The bottom's height [m, upward; >= 0 is land] in each cell around a grid point: shape (ni, nj).
 
-    A glider keeps `clearance` [m] above it. `index_map` as in `flow.OceanGrid`.
+    A glider keeps `clearance` [m] above it. `index_map` as in `flow.OceanGrid`. `ground` (ni, nj): the seabed
+    itself, for figures: -inf where it is not known, though `bottom` closes what lies below.
     """
 
     bottom: Array
@@ -28,6 +29,7 @@ class Seabed(NamedTuple):
     per_y: float
     x_lo: float
     y_lo: float
+    ground: Array
 
 
 Terrain = OpenWater | Seabed

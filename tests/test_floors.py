@@ -16,10 +16,10 @@ FLOORS = {
     4: "roadmap",
     5: "scenario search jobs",
     6: "plot pilot evaluation",
-    7: "opened planner cli",
+    7: "opened planner cli __main__",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
-DOORS = {("planner", "opened"), ("cli", "planner"), ("cli", "opened")}
+DOORS = {("planner", "opened"), ("cli", "planner"), ("cli", "opened"), ("__main__", "cli")}
 """On their own floor, the command line calls the planner, and both open roadmaps."""
 
 

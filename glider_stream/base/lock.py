@@ -1,15 +1,21 @@
 """A lock on an output: one build at a time writes it."""
 
 import contextlib
-import fcntl
 import json
 import os
 import platform
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
+
+import portalocker
 
 from .errors import InputError
+from .output import is_running
+
+ENDING = ".glider-stream.lock"
+"""Of a lock's name. Other programs keep files such as poetry.lock, which are no locks and not ours."""
 
 
 @contextlib.contextmanager
@@ -17,33 +23,35 @@ def locked(output: Path) -> Iterator[None]:
     """Hold the lock beside an output for as long as the block runs; InputError, naming the holder, if taken.
 
     The system's own lock on the file, which ends with its process: what a killed build leaves is no obstacle.
+    On a file system without locks, the file itself is the lock: see `_claimed`.
     """
-    path = output.with_name(f"{output.name}.lock")
+    path = output.with_name(f"{output.name}{ENDING}")
     while True:
         try:
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            said = (error.strerror or "").lower()
-            raise InputError(f"the output {output} cannot be locked: {said}; name another") from None
+            reason = (error.strerror or "").lower()
+            raise InputError(f"the output {output} cannot be locked: {reason}; name another") from None
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            who = _holder(handle)
+            portalocker.lock(handle, portalocker.LockFlags.EXCLUSIVE | portalocker.LockFlags.NON_BLOCKING)
+        except portalocker.AlreadyLocked:
+            holder = _holder(handle)
             os.close(handle)
-            raise InputError(
-                f"another build of {output} is running, {who}; wait for it, or name another"
-            ) from None
+            raise InputError(_taken(output, holder)) from None
+        except portalocker.LockException:
+            os.close(handle)
+            with _claimed(output, path):
+                yield
+            return
         # whoever held it may have removed the file since it was opened
         with contextlib.suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(handle), os.stat(path)):
                 break
         os.close(handle)
     try:
-        now = datetime.now(UTC).isoformat("T", "seconds")
-        me = {"process": os.getpid(), "machine": platform.node(), "since": now}
         with contextlib.suppress(OSError):  # who holds it is a courtesy, which a full disk may not stop
             os.ftruncate(handle, 0)
-            os.pwrite(handle, json.dumps(me).encode(), 0)
+            os.write(handle, _myself())
         yield
     finally:
         with contextlib.suppress(OSError):
@@ -51,9 +59,89 @@ def locked(output: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _holder(handle: int) -> str:
+@contextlib.contextmanager
+def _claimed(output: Path, path: Path) -> Iterator[None]:
+    """As `locked`, where the file system has no locks: the name of the lock is taken by who makes it first.
+
+    A hard link to a file of one's own is made whole or not at all, on network file systems, too. A build of
+    this machine that has ended is no obstacle; one of another machine may still run, and only a person knows.
+    """
+    mine = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}")
     try:
-        said = json.loads(os.pread(handle, 4096, 0))
-        return f"process {int(said['process'])} on {said['machine']} since {said['since']}"
-    except (OSError, ValueError, TypeError, KeyError):
-        return "which has not said who it is"
+        mine.write_bytes(_myself())
+        while not _linked(mine, path):
+            _remove_stale(output, path, mine.with_name(f"{mine.name}.old"))
+    except OSError as error:
+        reason = (error.strerror or "").lower()
+        raise InputError(f"the output {output} cannot be locked: {reason}; name another") from None
+    finally:
+        with contextlib.suppress(OSError):
+            mine.unlink()
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+
+def _remove_stale(output: Path, path: Path, aside: Path) -> None:
+    """Remove a lock whose holder has ended; InputError, naming the holder, if it may still run."""
+    with contextlib.suppress(FileNotFoundError):  # its holder may have just removed it
+        before = path.read_bytes()
+        holder = _read(before)
+        # an empty file is what the attempt at a true lock leaves
+        ended = holder.get("machine") == platform.node() and not is_running(int(holder["process"]))
+        if holder and not ended:
+            cure = f"or remove {path} if that build has ended, since this disk has no locks"
+            raise InputError(f"{_taken(output, holder)}, {cure}")
+        # moved, then looked at again: two builds may find the same stale lock at once
+        os.rename(path, aside)
+        if aside.read_bytes() != before:
+            with contextlib.suppress(OSError):
+                os.link(aside, path)
+        aside.unlink()
+
+
+def _linked(mine: Path, path: Path) -> bool:
+    """Whether the lock's name is now ours; made anew where the file system has no hard links either."""
+    try:
+        os.link(mine, path)
+    except FileExistsError:
+        return False
+    except OSError:
+        try:
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        except FileExistsError:
+            return False
+        os.write(handle, _myself())
+        os.close(handle)
+    return True
+
+
+def _myself() -> bytes:
+    now = datetime.now(UTC).isoformat("T", "seconds")
+    return json.dumps({"process": os.getpid(), "machine": platform.node(), "since": now}).encode()
+
+
+def _read(text: bytes) -> dict[str, Any]:
+    """Who holds a lock; empty where it does not say so."""
+    try:
+        told = json.loads(text)
+        return {"process": int(told["process"]), "machine": str(told["machine"]), "since": str(told["since"])}
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return {}
+
+
+def _holder(handle: int) -> dict[str, Any]:
+    try:
+        os.lseek(handle, 0, os.SEEK_SET)
+        return _read(os.read(handle, 4096))
+    except OSError:
+        return {}
+
+
+def _taken(output: Path, holder: dict[str, Any]) -> str:
+    who = "which has not said who it is"
+    if holder:
+        who = f"process {holder['process']} on {holder['machine']} since {holder['since']}"
+    return f"another build of {output} is running, {who}; wait for it, or name another"

@@ -1,4 +1,4 @@
-"""Threads: kernels without the interpreter's lock, a few items at a time, whoever is free takes the next."""
+"""Threads: kernels run without the interpreter's lock; each free thread takes the next few items."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -8,6 +8,7 @@ from typing import Any
 
 import numba
 
+from .cores import usable_cores
 from .settings import require
 
 _CONFIG: Any = numba.config  # its settings are made at run time
@@ -16,13 +17,14 @@ _COUNT: ContextVar[int | None] = ContextVar("threads", default=None)
 
 @contextmanager
 def threads(count: int | None) -> Iterator[int]:
-    """Run kernels on `count` threads (all cores, or NUMBA_NUM_THREADS, if None); yields the number."""
-    most = int(_CONFIG.NUMBA_NUM_THREADS)
+    """Run kernels on `count` threads (all that this process may use if None); yields the number."""
+    most = max(usable_cores(), int(_CONFIG.NUMBA_NUM_THREADS))
     fits = count is None or 1 <= count <= most
     require(fits, f"`threads` must be from 1 to {most} on this machine; got {count}")
-    before = _COUNT.set(count or most)
+    used = count or usable_cores()
+    before = _COUNT.set(used)
     try:
-        yield count or most
+        yield used
     finally:
         _COUNT.reset(before)
 
@@ -30,10 +32,10 @@ def threads(count: int | None) -> Iterator[int]:
 def in_parallel(kernel: Callable[[int, int], object], count: int, at_once: int) -> None:
     """Call `kernel(first, last)` until 0..count - 1 are done, `at_once` of them in a call.
 
-    The kernel writes to rows of its own items alone, so that neither the threads nor `at_once` change a bit.
+    The kernel only writes to the rows of its items, so that results depend neither on threads nor on `at_once`.
     """
     spans = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
-    workers = min(_COUNT.get() or int(_CONFIG.NUMBA_NUM_THREADS), len(spans))
+    workers = min(_COUNT.get() or usable_cores(), len(spans))
     if workers <= 1:
         for span in spans:
             kernel(*span)

@@ -4,6 +4,26 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from .errors import InputError
+
+DEEPEST = 20
+"""Levels of tables and lists in a scenario; it needs four."""
+
+
+def check_depth(table: Mapping[str, Any], what: str) -> None:
+    """InputError where tables lie within tables so deep that nothing can be said of them."""
+    level: list[Any] = [table]
+    for _ in range(DEEPEST):
+        level = [
+            inner
+            for one in level
+            for inner in (one.values() if isinstance(one, Mapping) else one)
+            if isinstance(inner, (Mapping, list))
+        ]
+        if not level:
+            return
+    raise InputError(f"{what} holds tables within tables, more than {DEEPEST} deep; a key has one dot or two")
+
 
 def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
     """A nested table as TOML text: values first, then sub-tables, then lists of tables."""
@@ -11,8 +31,8 @@ def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
     for key, value in table.items():
         if isinstance(value, Mapping):
             below.append(f"[{prefix}{key}]\n{to_toml(value, f'{prefix}{key}.')}")
-        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            below.extend(f"[[{prefix}{key}]]\n{to_toml(one, f'{prefix}{key}.')}" for one in value)
+        elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+            below.extend(f"[[{prefix}{key}]]\n{to_toml(item, f'{prefix}{key}.')}" for item in value)
         else:
             lines.append(f"{key} = {_toml_value(value)}\n")
     return "".join(lines) + "".join(below)
@@ -24,6 +44,6 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, (int, float)):
         return repr(value)
     if isinstance(value, list):
-        return "[" + ", ".join(_toml_value(one) for one in value) + "]"
-    # JSON escapes as TOML does, but for one character
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    # JSON escapes like TOML, except for one character
     return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")

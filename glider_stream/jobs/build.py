@@ -1,5 +1,6 @@
 """Jobs: builds that survive their process, in parts, on what an older roadmap holds, and on a cluster."""
 
+import heapq
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -11,15 +12,15 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Index
 from ..base.errors import InputError, Stopped, Unwritable
 from ..base.lock import locked
-from ..base.output import check_output
+from ..base.output import check_output, remove_abandoned
 from ..base.settings import require
 from ..base.threads import threads
 from ..roadmap.builder import BATCH_PAIRS, Progress, Tally, find_edges, node_positions, warm_up
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
-from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
+from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, by_node, in_order
 from ..roadmap.shard import Shard
-from ..roadmap.step_error import with_steps_checked
+from ..roadmap.step_error import StepSample
 from ..roadmap.store import read_part, writing
 from .journal import Journal
 
@@ -73,21 +74,23 @@ def build_file(
     check_output(path)
     target = path.resolve()  # a link stays one
     with locked(target):
-        for left in target.parent.glob(f".{_literal(target.name)}.*{_literal(target.suffix)}"):
-            left.unlink(missing_ok=True)  # by a build that was killed in its last moment
+        remove_abandoned(target)
         position = node_positions(problem)
-        made = provenance_of(problem, position)
+        made = provenance_of(problem, position, target.parent)
         shard = job.shard or Shard(1, 1)
-        identity = {**made.identity(), "shard": str(shard), "nodes": len(position)}
+        nodes = np.arange(*shard.nodes(len(position)))
+        old = _taken_over(job, nodes)
+        # what a base gave is no part of the records, so none of them fits another base, or none
+        identity = {**made.identity(), "shard": str(shard), "nodes": len(position), "base": old.digest()}
         journal_path = target.with_name(f"{target.name}.journal")
         kept = ""
         try:
             with (
-                Journal(journal_path, identity, len(position), job.restart, job.checkpoint) as journal,
+                Journal(journal_path, identity, nodes, job.restart, job.checkpoint) as journal,
                 threads(thread_count) as used,
             ):
                 try:
-                    _run(problem, position, made, path, journal, shard, job, used, progress, batch_pairs)
+                    _run(problem, position, made, path, journal, shard, old, job, used, progress, batch_pairs)
                 finally:
                     kept = (
                         f"{int(journal.done.sum()):,} of {len(position):,} nodes are kept in {journal_path.name}"
@@ -104,11 +107,6 @@ def build_file(
             raise InputError(f"the output {path} cannot be written whole: {reason}; {room}{more}") from None
 
 
-def _literal(name: str) -> str:
-    """A name as a pattern that matches it alone."""
-    return re.sub(r"([*?[])", r"[\1]", name)
-
-
 def _run(
     problem: Problem,
     position: Array,
@@ -116,24 +114,25 @@ def _run(
     path: Path,
     journal: Journal,
     shard: Shard,
+    old: Edges,
     job: Job,
     used: int,
     progress: Callable[[Progress], None],
     batch_pairs: int,
 ) -> None:
-    made = with_steps_checked(
-        made, problem, position, lambda some: in_order(list(job.finder(problem, position, some, batch_pairs)))
-    )
     nodes = np.arange(*shard.nodes(len(position)))
-    tally = Tally(len(nodes), used)
-    old = _taken_over(job, nodes)
-    if old is not None:
+    tally, sample = Tally(len(nodes), used), StepSample(len(position))
+    if old.source.size:
         tally.add(old)
+        sample.take(old)
     for edges in journal.records():
         tally.add(edges)
+        sample.take(edges)
+    made = sample.checked(made, problem, position, lambda some: job.finder(problem, position, some, batch_pairs))
     known = journal.done.copy()
-    if old is not None:
-        known[old.source] = True
+    twice = known[old.source].any()
+    require(not twice, f"{journal.path} holds nodes that --from has right; begin anew with --restart")
+    known[old.source] = True
     waiting = nodes[~known[nodes]]
     if waiting.size:
         if job.warm:
@@ -142,15 +141,21 @@ def _run(
             journal.append(edges)
             progress(tally.add(edges))
     with writing(path, position, lonlat_of(problem, position), made, shard) as file:
-        _write(file.append, old, journal.records())
+        for edges in by_node(heapq.merge([old], journal.records(), key=_first)):
+            file.append(edges)
         file.finish(tally)
     journal.remove()
 
 
-def _taken_over(job: Job, nodes: Index) -> Edges | None:
-    """The edges of the nodes that an older roadmap has right."""
+def _first(edges: Edges) -> int:
+    """The first node that edges leave, -1 where there is none."""
+    return int(edges.source[0]) if edges.source.size else -1
+
+
+def _taken_over(job: Job, nodes: Index) -> Edges:
+    """Of some nodes, the edges that an older roadmap has right."""
     if job.base is None:
-        return None
+        return in_order([])
     road, right = job.base
     assert road.node_counts is not None
     values = np.stack([getattr(road, name) for name in EDGE_FIELDS], axis=1)
@@ -158,20 +163,6 @@ def _taken_over(job: Job, nodes: Index) -> Edges | None:
     mine = np.zeros(len(right), dtype=bool)
     mine[nodes] = True
     return every.of(right & mine)
-
-
-def _write(append: Callable[[Edges], None], old: Edges | None, records: Iterator[Edges]) -> None:
-    """Hand over all edges in the order of their nodes."""
-    if old is None:
-        for edges in records:
-            append(edges)
-        return
-    first = 0
-    for edges in records:
-        last = int(edges.source[-1])
-        append(in_order([edges, old.of((old.source >= first) & (old.source <= last))]))
-        first = last + 1
-    append(old.of(old.source >= first))
 
 
 def merge(parts: Sequence[str | Path], output: str | Path) -> None:

@@ -2,9 +2,11 @@
 
 import contextlib
 import importlib
-import os
+import itertools
+import math
 import re
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
+from ..base.cores import usable_cores
 from ..base.errors import InputError
 from ..base.settings import require
 from ..base.threads import threads
@@ -26,6 +29,8 @@ AHEAD = 4
 """Chunks that wait at the scheduler for each thread of a worker."""
 TRIES = 10
 """Workers that a chunk may lose before it is held for their end."""
+COUNT_AGAIN = 1.0
+"""Seconds after which the workers are counted again."""
 WAIT = 60.0
 """Seconds to wait for a scheduler and for its first worker."""
 _ONE_AT_A_TIME = threading.Lock()
@@ -93,7 +98,7 @@ def scheduler(address: str) -> Iterator["Cluster"]:
         return
     count = int(own.group(1))
     require(count >= 1, f"a local cluster has 1 worker or more; got {address!r}")
-    each = max(1, (os.cpu_count() or 1) // count)
+    each = max(1, usable_cores() // count)
     with (
         distributed.LocalCluster(
             n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
@@ -112,31 +117,32 @@ class Cluster:
 
     def find_edges(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
         """As `roadmap.find_edges`, but in the order in which chunks are done; a lost worker's are done again."""
+        try:
+            yield from self._evaluated(problem, position, source, batch_pairs)
+        except InputError:
+            raise
+        except Exception as error:
+            # what the death of a worker or of the scheduler, or a broken network, raises is not written anywhere
+            reason = " ".join(str(error).split())[:300].rstrip(".") or type(error).__name__
+            raise InputError(
+                f"the cluster failed: {reason}; give the same command to go on, here or with another scheduler"
+            ) from None
+
+    def _evaluated(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
         self.client.wait_for_workers(1, timeout=WAIT)
         # degrees are made here, where the scenario is; a frame need not travel
         work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
         sent = self.client.scatter(work, broadcast=True, hash=False)
         size = max(1, batch_pairs // problem.legs(position).pairs_per_node)
         chunks = iter(np.array_split(source, range(size, len(source), size)))
-
-        def submit() -> Any | None:
-            chunk = next(chunks, None)
-            return None if chunk is None else self.client.submit(evaluate, sent, chunk, pure=False, retries=TRIES)
-
-        room = AHEAD * max(1, sum(self.client.nthreads().values()))
-        waiting = _distributed().as_completed([future for _ in range(room) if (future := submit()) is not None])
-        for future in waiting:
-            try:
-                edges = future.result()
-            except InputError:
-                raise
-            except Exception as error:
-                # what a worker's death, or a broken network, raises is not written down anywhere
-                said = " ".join(str(error).split())[:300] or type(error).__name__
-                raise InputError(
-                    f"a chunk failed on the cluster: {said}; give the same command to go on"
-                ) from None
-            following = submit()
-            if following is not None:
-                waiting.add(following)
-            yield edges
+        waiting = _distributed().as_completed()
+        counted, room = -math.inf, 0
+        while True:
+            if time.monotonic() - counted >= COUNT_AGAIN:
+                # a worker that joins late gets its share
+                counted, room = time.monotonic(), AHEAD * max(1, sum(self.client.nthreads().values()))
+            for chunk in itertools.islice(chunks, max(0, room - waiting.count())):
+                waiting.add(self.client.submit(evaluate, sent, chunk, pure=False, retries=TRIES))
+            if waiting.is_empty():
+                return
+            yield next(waiting).result()

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import stat
 import struct
 import time
 from collections.abc import Iterator, Mapping
@@ -12,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Index
 from ..base.errors import InputError
+from ..base.settings import require
 from ..roadmap.roadmap import EMPTY, Edges
 
 MAGIC = b"glider-stream/journal 1\n"
@@ -21,6 +24,8 @@ RECORD = struct.Struct("<4sQQd")
 MARK = b"edge"
 DIGEST = 16
 LONGEST_HEADER = 100_000
+BINARY = getattr(os, "O_BINARY", 0)
+"""Windows would otherwise write a carriage return before each byte 10."""
 
 
 def _sizes(nodes: int, edges: int) -> list[tuple[tuple[int, ...], np.dtype[Any]]]:
@@ -35,12 +40,18 @@ class Journal:
     what was written, against the loss of power; the loss of the process alone costs nothing written.
     """
 
-    def __init__(self, path: Path, identity: Mapping[str, Any], nodes: int, restart: bool, every: float) -> None:
-        """Go on with the journal at `path`, or begin it; InputError where it is of another build."""
+    def __init__(
+        self, path: Path, identity: Mapping[str, Any], nodes: Index, restart: bool, every: float
+    ) -> None:
+        """Go on with the journal at `path`, or begin it; InputError where it is of another build.
+
+        `nodes`, rising: those that records may hold, each once.
+        """
         self.path, self.every = path, every
-        self.done = np.zeros(nodes, dtype=bool)
+        self.done = np.zeros(int(nodes[-1]) + 1 if nodes.size else 0, dtype=bool)
+        self._nodes = nodes
         self._places: list[tuple[int, int]] = []
-        self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | BINARY, 0o666), "r+b", buffering=0)
         self._end, self._mine = 0, False
         self._synced = time.monotonic()
         try:
@@ -51,7 +62,7 @@ class Journal:
 
     def _begin(self, identity: Mapping[str, Any], restart: bool) -> None:
         header = MAGIC + json.dumps(identity, sort_keys=True).encode() + b"\n"
-        if restart or not self._resumes(identity):
+        if not self._resumes(identity, restart):
             self._file.truncate(0)
             self._mine = True
             self._write(header)
@@ -77,17 +88,17 @@ class Journal:
         finally:
             self._file.close()
 
-    def _resumes(self, identity: Mapping[str, Any]) -> bool:
-        """Whether there is a journal of the same build; its records begin at `_end`."""
+    def _resumes(self, identity: Mapping[str, Any], restart: bool) -> bool:
+        """Whether to go on with a journal of the same build; its records begin at `_end`."""
+        in_the_way = f"{self.path} is in the way of this build's journal, and is none; move it away"
+        require(stat.S_ISREG(os.fstat(self._file.fileno()).st_mode), in_the_way)
         self._file.seek(0)
         head = self._file.read(LONGEST_HEADER)
         line = head[len(MAGIC) :].split(b"\n", 1)
-        if not head.startswith(MAGIC) or len(line) < 2:
-            # a build that was killed before its first word
-            own = MAGIC.startswith(head[: len(MAGIC)]) or not head
-            if own or head.startswith(MAGIC):
-                return False
-            raise InputError(f"{self.path} is in the way of this build's journal, and is none; move it away")
+        # a build that was killed before its first word leaves a part of it
+        require(head.startswith(MAGIC) or MAGIC.startswith(head), in_the_way)
+        if restart or not head.startswith(MAGIC) or len(line) < 2:
+            return False
         try:
             said = json.loads(line[0])
         except (ValueError, RecursionError):
@@ -109,7 +120,7 @@ class Journal:
             if record is None:
                 return
             edges, length = record
-            if edges.source.size == 0 or edges.source[0] < 0 or edges.source[-1] >= self.done.size:
+            if not self._is_new(edges):
                 return
             self._places.append((int(edges.source[0]), self._end))
             self._end += length
@@ -138,6 +149,14 @@ class Journal:
         ]
         source, degree, target, values, counts = arrays
         return Edges(source, degree, target, values, counts, seconds), len(head) + len(body)
+
+    def _is_new(self, edges: Edges) -> bool:
+        """Whether a record holds nodes of this build, rising, that no record before it holds."""
+        source = edges.source
+        rises = source.size > 0 and bool((np.diff(source) > 0).all())
+        if not rises or self._nodes.size == 0 or source[0] < self._nodes[0] or source[-1] > self._nodes[-1]:
+            return False
+        return not self.done[source].any() and int(edges.degree.sum()) == edges.target.size
 
     def _note(self, edges: Edges) -> None:
         self.done[edges.source] = True

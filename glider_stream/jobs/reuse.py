@@ -25,7 +25,7 @@ DETOUR = 1.0824
 """A way over eight neighbours is at most so much longer than the straight one: 1 / cos(22.5 degrees)."""
 STEPS = 17
 """Steps in which the speeds of cells are told apart."""
-VALUES = {"values", "max_speed", "level_speed", "level_carry", "bottom"}
+VALUES = {"values", "max_speed", "level_speed", "level_carry", "bottom", "ground"}
 """What may differ of two flows, or seabeds, on one grid."""
 
 

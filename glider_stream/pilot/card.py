@@ -9,7 +9,7 @@ import numpy as np
 from ..base.clock import moment
 from ..kernels.flow import velocities
 from ..roadmap.problem import Problem
-from ..search.path import SURFACE, Leg, Path
+from ..search.path import FROZEN, SURFACE, Leg, Path
 
 DAY = 86_400.0
 
@@ -59,10 +59,12 @@ class Card:
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON."""
         return {
+            "departs": None if self.path.departs is None else self.path.departs.isoformat(),
             "legs": [row.as_dict() for row in self.legs],
             "whole": self.whole.as_dict(),
             "surface_to_surface_s": list(self.under),
             "best_horizontal_mps": self.best,
+            **({} if self.path.departure is None else {"frozen": self.path.frozen}),
         }
 
     def __str__(self) -> str:
@@ -80,7 +82,7 @@ class Card:
                 f"* the water is faster than the vehicle's {self.best:.2f} m/s: "
                 f"no holding station on legs {', '.join(outrun)}"
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, *([FROZEN] if self.path.frozen else [])])
 
     def _line(self, name: str, row: Row) -> str:
         return (
@@ -126,8 +128,7 @@ def _distance(a: Any, b: Any) -> float:
 
 def _row(leg: Leg, path: Path, problem: Problem, best: float) -> Row:
     rows = leg.trajectory
-    # a leg is planned, and traced, in the water of the roadmap's departure
-    times = problem.departure + rows[:, 0] - rows[0, 0]
+    times = path.water_times(leg, problem.departure)
     current = velocities(problem.evaluator.flow, *(np.ascontiguousarray(rows[:, n]) for n in (1, 2, 3)), times)
     way = rows[-1, 1:3] - rows[0, 1:3]
     far = float(np.hypot(*way))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.output import check_output, replacing
 from ..base.settings import require
-from ..search.path import Leg, Path
+from ..search.path import FROZEN, Leg, Path
 from ..water.frame import wrapped
 from . import seaglider, slocum
 from .route_maps import FIRST, OUR_NAME, STOP
@@ -255,6 +255,23 @@ ANYWHERE = (".json", ".csv", ".windows.csv")
 """The forms that need no longitude and latitude."""
 
 
+def _saying_frozen(form: str, text: str) -> str:
+    """A file of a path whose clock does not run, with words that say so where its readers look."""
+    if form.endswith(".json"):
+        return text  # its `frozen` says so
+    if form.endswith(".geojson"):
+        return json.dumps({"note": FROZEN} | json.loads(text), indent=1) + "\n"
+    if form.endswith(".csv"):
+        first, *rows = text.splitlines()
+        return "\n".join([f"{first},note", *(f'{row},"{FROZEN}"' for row in rows)]) + "\n"
+    if form == ".kml":
+        name = "<name>glider-stream route</name>"
+        return text.replace(name, f"{name}\n    <description>{FROZEN}</description>", 1)
+    if form == ".gpx":
+        return text.replace("<rte>", f"<metadata><desc>{FROZEN}</desc></metadata>\n  <rte>", 1)
+    return f"{'#' if form == '.ma' else '/'} {FROZEN}\n{text}"
+
+
 def _form(file: str | File) -> str:
     place = File(file)
     double = "".join(place.suffixes[-2:]).lower()
@@ -297,6 +314,8 @@ def export_path(
         return []
     check_legs(path, [file])
     texts = EXPORTS[form](path, place.name, chosen)
+    if path.frozen:
+        texts = {name: _saying_frozen(form, text) for name, text in texts.items()}
     for name in texts:
         check_output(place.with_name(name))
     for name, text in texts.items():

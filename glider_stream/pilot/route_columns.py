@@ -60,6 +60,8 @@ _IGNORED = (
 )
 IGNORED = frozenset(_IGNORED.split())
 """Names of numbers that do not place a vehicle; a route is read without them."""
+MEASURE = re.compile(r"^\s*[-+]?\d+(\.\d*)?\s*(m|km|cm|ft|feet|fathoms?|metres?|meters?|dbar)\s*$", re.IGNORECASE)
+"""A number with the unit of a length behind it."""
 BRACKETS = re.compile(r"^(.*?)\s*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
 
 
@@ -109,7 +111,7 @@ def number(value: Any) -> float | None:
 def refuse_unknown(header: str, values: Iterable[Any], what: str) -> None:
     """NotARoute where a name that is not known holds numbers."""
     name, _ = bare_name(header)
-    if name in IGNORED or all(number(value) is None for value in values):
+    if name in IGNORED or not any(number(value) is not None or MEASURE.match(str(value)) for value in values):
         return
     raise NotARoute(
         f"its {what} {header.strip()!r} holds numbers, and their meaning is not known; if they place the vehicle "
@@ -121,9 +123,15 @@ def told_height(values: Mapping[str, Any], what: str) -> float | None:
     """The height [m, upward] that the properties of a point say, None where they say nothing of it."""
     found: dict[str, float] = {}
     for name, value in values.items():
-        column = column_of(name) if number(value) is not None else None
+        if value is None or value == "":
+            continue
+        column = column_of(name)
         if column is None:
             refuse_unknown(name, [value], what)
+        elif column.role in HEIGHTS and number(value) is None:
+            raise NotARoute(
+                f"its {what} {name!r} is {str(value)[:40]!r}, and not a number; write the unit in its name"
+            )
         elif column.role == "z":
             raise NotARoute(f"its {what} {name!r} may count up or down; call it depth or altitude")
         elif column.role in HEIGHTS:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Xml
 
 from ..base.errors import InputError
 from ..base.settings import require
-from .route_columns import NotARoute, csv_points, depth_of, number, told_height
+from .route_columns import HEIGHTS, NotARoute, column_of, csv_points, depth_of, refuse_unknown, told_height
 from .route_maps import OURS, Mark, gpx_points, kml_points, route_of
 from .seaglider import target_points
 from .slocum_files import goto_points
@@ -128,12 +128,12 @@ def _mark(place: Any, properties: dict[str, Any]) -> Mark:
 def _check_line(properties: dict[str, Any]) -> None:
     """NotARoute where a line's properties say how deep it lies: they would say it of all its points at once."""
     for name, value in properties.items():
-        several = [number(one) for one in value] if isinstance(value, list) else [number(value)]
-        if any(one is not None for one in several):
-            if told_height({name: several[0] or 0.0}, "property") is None:
-                continue
+        column = None if value is None else column_of(name)
+        if column is not None and column.role in HEIGHTS:
             refuse = "write depths as the third coordinate of each point, negative below the surface"
             raise NotARoute(f"its line has a property {name!r}, one for all of its points; {refuse}")
+        if column is None:
+            refuse_unknown(name, value if isinstance(value, list) else [value], "property")
 
 
 def _below(place: Any, properties: dict[str, Any]) -> tuple[Any, Any, float]:

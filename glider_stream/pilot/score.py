@@ -8,7 +8,7 @@ from typing import Any
 from ..base.arrays import Array
 from ..base.clock import moment, span
 from ..kernels.edges import Edge, Status
-from ..search.path import Hop, Path, hops_of
+from ..search.path import FROZEN, Hop, Path, hops_of
 
 REASONS = {
     Status.CURRENT_TOO_STRONG: "the current across it is stronger than the vehicle; go round, or with it",
@@ -77,6 +77,7 @@ class Score:
                 for leg in self.legs
             ],
             "notes": list(self.notes),
+            **({} if self.flown is None or self.flown.departure is None else {"frozen": self.flown.frozen}),
         }
 
     def __str__(self) -> str:
@@ -89,7 +90,8 @@ class Score:
             name = failed.status.name.lower().replace("_", " ")
             title = f"leg {len(self.legs)} of {self.asked} fails: {failed.why} ({name})"
         glides = iter(() if self.flown is None else self.flown.legs)
-        lines = [title, *(f"  note: {note}" for note in self.notes)]
+        still = [FROZEN] if self.flown is not None and self.flown.frozen else []
+        lines = [title, *(f"  note: {note}" for note in (*self.notes, *still))]
         for n, leg in enumerate(self.legs, 1):
             said = "fails"
             if leg.time is not None:
@@ -102,27 +104,30 @@ class Score:
 
 def score(
     points: Sequence[Array],
-    connect: Callable[[Array, Array], Edge],
-    query: Callable[[Array, Array], Path],
+    connect: Callable[[Array, Array, float], Edge],
+    query: Callable[[Array, Array, float], Path],
     fly: Callable[[list[Hop]], Path],
 ) -> Score:
     """Fly a drawn route: one glide between points at other depths, the best way of the roadmap between others.
 
-    `points` (3,) [m]. As in a query every glide is that of the roadmap's departure, whenever it begins.
+    `points` (3,) [m]. As in a query every glide begins when the last one ends: `connect` and `query` take the
+    seconds since departure.
     """
     legs: list[ScoredLeg] = []
     hops: list[Hop] = []
+    clock = 0.0
     for start, end in pairwise(points):
         if start[2] != end[2]:
-            edge = connect(start, end)
+            edge = connect(start, end, clock)
             status = Status(int(edge.status))
             new = [(start, end, edge)] if status == Status.CONNECTED else []
             found = bool(new)
         else:
-            way, status = query(start, end), Status.SAME_DEPTH
+            way, status = query(start, end, clock), Status.SAME_DEPTH
             new, found = hops_of(way), way.found
         legs.append(ScoredLeg(start, end, status, sum(hop[2].time for hop in new) if found else None, len(new)))
         if not found:
             break
         hops += new
+        clock += sum(hop[2].time for hop in new)
     return Score(tuple(legs), len(points) - 1, fly(hops) if hops else None)

@@ -159,7 +159,8 @@ def goto_faults(text: str, most: int = MOST_WAYPOINTS) -> list[str]:
     first = values.get("initial_wpt", 0.0)
     if first >= max(count, 1):
         faults.append(f"initial_wpt is {first:g}, and the last of {count} waypoints has the number {count - 1}")
-    if first == -2 and count > 1:
+    # a list that is flown for ever, as it is where nothing is said, may begin anywhere
+    if first == -2 and count > 1 and values.get("num_legs_to_run", -1.0) != -1:
         faults.append("initial_wpt is -2, the closest: an ordered route begins at 0")
     return faults + _row_faults(file.rows)
 

@@ -1,6 +1,6 @@
 """What every figure shares: look, units, files.
 
-Matplotlib's object interface alone: no global state, no window. The layout is frozen and no clock enters a
+Only matplotlib's object interface is used: no global state, no window. The layout is frozen and no clock enters a
 file, so the same input gives the same bytes.
 """
 
@@ -32,6 +32,10 @@ NO_CLOCK: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
+
+
+PASSING, STILL = ", as the route passes nearest", "FROZEN: all legs in the current of the departure"
+"""Of which time the currents of a figure are where the clock runs; what a figure says where it does not."""
 
 
 @contextlib.contextmanager

@@ -12,11 +12,23 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import Along, along
-from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
+from .canvas import (
+    GREY,
+    INK,
+    PASSING,
+    STILL,
+    colours,
+    frozen,
+    new_figure,
+    said_time,
+    said_when,
+    styled,
+    time_unit,
+)
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
-from .seabed import known_until, sample_bottom
-from .water import Frame, checked_depths, frame_of
+from .seabed import sample_bottom
+from .water import Frame, checked_depths, frame_of, passing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +38,7 @@ if TYPE_CHECKING:
     from ..search.path import Path
 
 DEEP = 2.5
-"""A seabed so many times deeper than the route would leave no room for the route."""
+"""A seabed that is so many times deeper than the route is not drawn: the route would be too small."""
 TIME_MAP = "plasma"
 THROUGH, OVER, CURRENT = "#0072b2", INK, "#d55e00"
 
@@ -64,19 +76,20 @@ def plot_chart(
         depth = frame.top if depths is None else float(checked_depths(depths, frame)[0])
         unit, name = time_unit(float(rows[-1, 0]))
         clock = _Clock(unit, name, Normalize(0.0, float(rows[-1, 0]) / unit))
-        said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         if path.departs is not None:
             arrives = path.departs + timedelta(seconds=path.travel_time)
-            said += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
-        figure = new_figure(14.0, 8.6, f"{title}: {said}" if title else f"Route: {said}")
+            text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
+        text += f"; {STILL}" if path.frozen else ""
+        figure = new_figure(14.0, 8.6, f"{title}: {text}" if title else f"Route: {text}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
-        ax = left.add_subplot()
-        image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.55, arrows=22)
+        ax, at = left.add_subplot(), passing(path, problem.departure)
+        image = draw_current(ax, flow, terrain, frame, depth, at, pale=0.55, arrows=22)
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
-        when = said_when(is_steady(flow), problem.departure, problem.departs)
+        when = PASSING if path.clock_runs else said_when(is_steady(flow), problem.departure, problem.departs)
         every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
@@ -84,7 +97,7 @@ def plot_chart(
         look = {"location": "bottom", "aspect": 45, "pad": 0.01}
         left.colorbar(line, ax=ax, label=f"Time since departure ({name})", **look)
         panels = right.subplots(3, 1, sharex=True, height_ratios=(1.25, 1.0, 1.0))
-        _draw_depth(panels[0], flow, terrain, rows, clock)
+        _draw_depth(panels[0], terrain, rows, clock)
         steps = along(path)
         _draw_heading(panels[1], steps, clock)
         _draw_speeds(panels[2], steps, clock)
@@ -111,10 +124,9 @@ def _draw_route(ax: "Axes", frame: Frame, rows: Array, stops: Array, clock: _Clo
     return route
 
 
-def _draw_depth(ax: "Axes", flow: Flow, terrain: Terrain, rows: Array, clock: _Clock) -> None:
+def _draw_depth(ax: "Axes", terrain: Terrain, rows: Array, clock: _Clock) -> None:
     time, depth = rows[:, 0] / clock.unit, -rows[:, 3] + 0.0
-    known = known_until(flow, terrain)
-    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known)
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2])
     deepest, near = max(float(depth.max()), 1.0), float(seabed.min())
     shown = np.isfinite(seabed).any() and near < DEEP * deepest
     end = 1.12 * deepest
@@ -127,10 +139,10 @@ def _draw_depth(ax: "Axes", flow: Flow, terrain: Terrain, rows: Array, clock: _C
     ax.plot(time, depth, color="white", linewidth=3.6, zorder=4)
     ax.add_collection(_by_time(np.column_stack([time, depth]), rows[:, 0], clock, 2.0))
     ax.set(xlim=(time[0], time[-1]), ylim=(end, -0.05 * end), ylabel="Depth (m)")
-    said = "over the seabed" if shown else "no seabed on the way"
-    if not shown and np.isfinite([near, known]).any():
-        said = f"the seabed lies at {min(near, -known):,.0f} m or deeper"
-    ax.set_title(f"(b) Depth, {said}")
+    text = "over the seabed" if shown else "no seabed on the way"
+    if not shown and np.isfinite(near):
+        text = f"the seabed lies at {near:,.0f} m or deeper"
+    ax.set_title(f"(b) Depth, {text}")
 
 
 def _draw_heading(ax: "Axes", steps: Along, clock: _Clock) -> None:

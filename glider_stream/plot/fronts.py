@@ -56,12 +56,15 @@ def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
 
 
 def front_times(fronts: Fronts, hours: float) -> Array:
-    """The times [s] of fronts every so many hours; InputError where that is no interval, or far too fine."""
+    """The times [s] of fronts every so many hours; InputError where that is not an interval, or far too fine."""
     require(0.0 < hours < math.inf, f"`fronts` must be a number of hours above 0; got {hours:g}")
     last = float(fronts.time.max(initial=0.0)) / HOUR
-    count = math.floor(last / hours)
+    lines = last / hours
     least = f"give {last / MOST:.2g} hours or more"
-    require(count <= MOST, f"`fronts` every {hours:g} hours are {count} lines until {last:.3g} hours; {least}")
+    require(
+        lines < MOST + 1, f"`fronts` every {hours:g} hours are {lines:.0f} lines until {last:.3g} hours; {least}"
+    )
+    count = math.floor(lines)
     return np.asarray(np.arange(1, count + 1) * (hours * HOUR), np.float64)
 
 

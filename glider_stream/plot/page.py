@@ -22,11 +22,11 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import length_unit, said_time, said_when, thinned, time_unit
+from .canvas import PASSING, STILL, length_unit, said_time, said_when, thinned, time_unit
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
-from .seabed import known_until, sample_bottom
-from .water import Frame, frame_of, sample_field
+from .seabed import sample_bottom
+from .water import Frame, Time, frame_of, passing, sample_field
 
 if TYPE_CHECKING:
     from ..roadmap.problem import Problem
@@ -67,9 +67,9 @@ def save_page(
         "box": [*frame.x, *frame.y],
         "unit": dict(zip(("size", "name"), length_unit(frame.x, frame.y), strict=True)),
         "lonlat": _lonlat(frame),
-        "current": _current(flow, frame, levels, problem.departure),
-        "seabed": _seabed(flow, terrain, frame),
-        "legs": _legs(flow, terrain, path),
+        "current": _current(flow, frame, levels, passing(path, problem.departure)),
+        "seabed": _seabed(terrain, frame),
+        "legs": _legs(terrain, path),
         "fronts": None if fronts is None else _fronts(*fronts),
     }
     text = page_text(held, held["title"])
@@ -98,11 +98,11 @@ def page_text(held: dict[str, Any], title: str) -> str:
 
 def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str, Any]:
     unit, name = time_unit(path.travel_time)
-    when = said_when(is_steady(flow), problem.departure, problem.departs)
+    when = PASSING if path.clock_runs else said_when(is_steady(flow), problem.departure, problem.departs)
     legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
     return {
         "title": title or "Route",
-        "said": f"{legs}, {said_time(path.travel_time)}",
+        "said": f"{legs}, {said_time(path.travel_time)}" + (f"; {STILL}" if path.frozen else ""),
         "when": when,
         "time": {"size": unit, "name": name, "total": path.travel_time},
         "departs": None if path.departs is None else path.departs.timestamp() * 1e3,
@@ -125,10 +125,11 @@ def _lonlat(frame: Frame) -> dict[str, Any] | None:
     return {"points": LONLAT_POINTS, "lon": _numbers(lon, 6), "lat": _numbers(lat, 6)}
 
 
-def _current(flow: Flow, frame: Frame, depths: Array, t: float) -> dict[str, Any]:
+def _current(flow: Flow, frame: Frame, depths: Array, t: Time) -> dict[str, Any]:
     """The current in mm/s at cell centres, row by row from the south, for each depth."""
     x, y = frame.mesh(CURRENT_CELLS)
-    fields = [sample_field(flow, x, y, -depth, t) for depth in depths]
+    times = t(x, y) if callable(t) else t
+    fields = [sample_field(flow, x, y, -depth, times) for depth in depths]
     fastest = max(float(np.nanmax(np.hypot(u, v), initial=0.0)) for u, v in fields)
     return {
         "cells": [x.shape[1], x.shape[0]],
@@ -139,20 +140,20 @@ def _current(flow: Flow, frame: Frame, depths: Array, t: float) -> dict[str, Any
     }
 
 
-def _seabed(flow: Flow, terrain: Terrain, frame: Frame) -> dict[str, Any] | None:
+def _seabed(terrain: Terrain, frame: Frame) -> dict[str, Any] | None:
     """Depth of the seabed at cell centres [m], 0 on land, None where it is not known; None if nowhere."""
     x, y = frame.mesh(SEABED_CELLS)
-    depth = -sample_bottom(terrain, x, y, known_until(flow, terrain))
+    depth = -sample_bottom(terrain, x, y)
     if not np.isfinite(depth).any():
         return None
     return {"cells": [x.shape[1], x.shape[0]], "depth": _numbers(depth, 0)}
 
 
-def _legs(flow: Flow, terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
+def _legs(terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
     most = max(FEWEST, MOST_ROWS // len(path.legs))
     kept = [leg.trajectory[thinned(len(leg.trajectory), most)] for leg in path.legs]
     rows = np.concatenate(kept)
-    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2], known_until(flow, terrain))
+    seabed = -sample_bottom(terrain, rows[:, 1], rows[:, 2])
     last = np.cumsum([len(some) for some in kept])
     means = _means(path)
     legs = []

@@ -10,9 +10,21 @@ from ..base.settings import require
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
-from .canvas import GREY, INK, colours, frozen, new_figure, said_time, said_when, styled, time_unit
+from .canvas import (
+    GREY,
+    INK,
+    PASSING,
+    STILL,
+    colours,
+    frozen,
+    new_figure,
+    said_time,
+    said_when,
+    styled,
+    time_unit,
+)
 from .scene import draw_current, draw_ends, draw_space, stretch
-from .water import Frame, checked_depths, frame_of, sample_field
+from .water import Frame, checked_depths, frame_of, passing, sample_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +44,8 @@ def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) ->
     if depths is not None:
         require(1 <= len(depths) <= MAX_MAPS, f"`depths` must name 1 to {MAX_MAPS} depths; got {len(depths)}")
         return np.unique(checked_depths(depths, frame))
-    own = np.unique(np.round(-position[:, 2], 1) + 0.0)
-    return own if own.size <= MAX_MAPS else np.round(np.linspace(frame.top, frame.bottom, MAX_MAPS))
+    levels = np.unique(np.round(-position[:, 2], 1) + 0.0)
+    return levels if levels.size <= MAX_MAPS else np.round(np.linspace(frame.top, frame.bottom, MAX_MAPS))
 
 
 def map_columns(count: int, frame: Frame) -> tuple[int, float]:
@@ -59,8 +71,8 @@ def plot_route(
 ) -> "Figure":
     """Draw a path among the nodes `position` (n, 3) [m], over the current at up to four `depths` [m].
 
-    Of `problem`, the box `lo`, `hi` [m], the `departure` [s], which is the time of the maps, and `to_lonlat`
-    are read.
+    Of `problem`, the box `lo`, `hi` [m], the `departure` [s] and `to_lonlat` are read. Where the clock runs the
+    maps show each place as the route passes nearest to it, else as at departure.
     """
     require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
     with styled():
@@ -70,13 +82,16 @@ def plot_route(
         stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)], np.float64)
         frame = frame_of(problem, np.vstack([rows[:, 1:], stops]))
         norm = Normalize(frame.top, frame.bottom)
-        said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         # a date beside each depth would cover the next map's title
         when = said_when(is_steady(flow), problem.departure, problem.departs)
         dated = when if problem.departs is not None else ""
-        said += f"; currents of {dated.removeprefix(', ')}" if dated else ""
-        figure = new_figure(13.0, 9.8, f"{title}: {said}" if title else f"Route: {said}")
-        levels = map_depths(position, frame, depths)
+        if path.clock_runs:
+            when = dated = PASSING
+        text += f"; currents {'' if path.clock_runs else 'of '}{dated.removeprefix(', ')}" if dated else ""
+        text += f"; {STILL}" if path.frozen else ""
+        figure = new_figure(13.0, 9.8, f"{title}: {text}" if title else f"Route: {text}")
+        levels, at = map_depths(position, frame, depths), passing(path, problem.departure)
         columns, filled = map_columns(levels.size, frame)
         right = 0.4 + 0.75 * filled
         grid = figure.add_gridspec(2, 3, height_ratios=(2.4, 1.0), width_ratios=(2.15 - right, 0.03, right))
@@ -86,7 +101,7 @@ def plot_route(
         cells = grid[0, 2].subgridspec(-(-levels.size // columns), columns)
         maps = [figure.add_subplot(cells[n // columns, n % columns]) for n in range(levels.size)]
         for n, (ax, depth) in enumerate(zip(maps, levels, strict=True)):
-            draw_current(ax, flow, terrain, frame, depth, problem.departure)
+            draw_current(ax, flow, terrain, frame, depth, at)
             ax.set_title(f"{'(b) ' if n == 0 else ''}Current at {depth:.4g} m{'' if dated else when}")
             below, left = n + columns >= levels.size, n % columns == 0
             ax.set(xlabel=frame.labels[0] * below, ylabel=frame.labels[1] * left)
@@ -166,7 +181,8 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
             last = middle
     at = np.linspace(rows[0, 0], rows[-1, 0], ARROWS)[1:-1]
     x, y, z = (np.interp(at, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
-    u, v = sample_field(flow, x, y, z, at + departure)
+    begins = departure if path.departure is None else path.departure
+    u, v = sample_field(flow, x, y, z, begins + (0.0 * at if path.frozen else at))
     fastest = float(np.nanmax(np.hypot(u, v), initial=0.0)) or 1.0
     power = 10.0 ** np.floor(np.log10(fastest))
     key = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= fastest)

@@ -9,8 +9,8 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from .canvas import GREY, INK, colours, thinned
 from .graticule import draw_graticule
-from .seabed import without_clearance
-from .water import Frame, sample_field, sample_water
+from .seabed import ground_of
+from .water import Frame, Time, sample_field, sample_water
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +28,7 @@ def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:
 
     x, y = frame.mesh(PIXELS)
     dry = (~sample_water(terrain, x, y, -depth)).astype(np.float64)
-    land = ~sample_water(without_clearance(terrain), x, y, 0.0)
+    land = ~sample_water(ground_of(terrain), x, y, 0.0)
     dry += land
     ends = [side / frame.unit for side in (*frame.x, *frame.y)]
     grey = ListedColormap(["white", SEABED, LAND])
@@ -50,18 +50,20 @@ def draw_current(
     terrain: Terrain,
     frame: Frame,
     depth: float,
-    t: float,
+    t: Time,
     pale: float = 0.15,
     arrows: int = 15,
 ) -> Any:
-    """The current at a depth [m] and time t [s]: speed as colour, direction as arrows; returns the image.
+    """The current at a depth [m] and time t [s], one or that of each place; returns the image.
+
+    Speed as colour, direction as arrows.
 
     `pale` is the share of white in the colours, `arrows` their number along the longer side.
     """
 
     def current(count: int) -> tuple[Array, Array, Array, Array]:
         x, y = frame.mesh(count)
-        u, v = sample_field(flow, x, y, -depth, t)
+        u, v = sample_field(flow, x, y, -depth, t(x, y) if callable(t) else t)
         wet = sample_water(terrain, x, y, -depth)
         return x / frame.unit, y / frame.unit, np.where(wet, u, np.nan), np.where(wet, v, np.nan)
 
@@ -89,7 +91,7 @@ def draw_current(
 
 
 def draw_ends(ax: Any, points: Array, size: float = 1.0) -> None:
-    """Start and goal, told apart by shape: colour alone is lost in print."""
+    """Start and goal, told apart by shape: print loses colours."""
     for row, marker, area, label in ((0, "o", 70, "start"), (-1, "*", 190, "goal")):
         place = [points[row, k : k + 1] for k in range(points.shape[1])]
         look = {"edgecolors": INK, "facecolors": "white", "linewidths": 1.4, "zorder": 9, "clip_on": False}
@@ -123,5 +125,5 @@ def draw_space(ax: Any, terrain: Terrain, frame: Frame, nodes: Array, ticks: int
 def stretch(frame: Frame) -> str:
     """How many times depth is stretched in `draw_space`, in words."""
     times = HEIGHT * max(frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]) / (frame.bottom - frame.top)
-    said = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
-    return f"depth stretched {said} times" if times > 1.05 else "depth to scale"
+    text = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    return f"depth stretched {text} times" if times > 1.05 else "depth to scale"

@@ -15,6 +15,7 @@ from .canvas import Side, length_unit
 
 if TYPE_CHECKING:
     from ..roadmap.problem import Problem
+    from ..search.path import Path
 
 
 @entry_point()
@@ -44,6 +45,29 @@ def sample_water(terrain: Terrain, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> 
     wet = np.zeros(points[0].size, np.bool_)
     _sample_water(terrain, *(p.flatten() for p in points), wet)
     return wet.reshape(points[0].shape)
+
+
+Time = float | Callable[[Array, Array], Array]
+"""The time [s] of a map's current: one, or that of each place x, y [m]."""
+
+
+def passing(path: "Path", departure: float) -> Time:
+    """When a map of a route is read: where the clock runs, each place as the route passes nearest to it.
+
+    At the `departure` [s] where it does not, or the flow is steady.
+    """
+    if not path.clock_runs:
+        return departure
+    from scipy.spatial import KDTree
+
+    begins, rows = departure if path.departure is None else path.departure, path.trajectory
+    tree = KDTree(rows[:, 1:3])
+
+    def nearest(x: Array, y: Array) -> Array:
+        _, row = tree.query(np.column_stack([x.ravel(), y.ravel()]))
+        return np.asarray(begins + rows[row, 0]).reshape(x.shape)
+
+    return nearest
 
 
 class Frame(NamedTuple):

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from .pairs import Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
 from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
-from .step_error import with_steps_checked
+from .step_error import StepSample
 
 BATCH_PAIRS = 100_000
 
@@ -115,22 +116,29 @@ def build_roadmap(
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
 ) -> Roadmap:
-    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk."""
+    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk.
+
+    Examples:
+        >>> problem = glider_stream.read_scenario("small.toml").problem()
+        >>> glider_stream.build_roadmap(problem).target.size
+        929
+    """
     position = node_positions(problem)
     parts: list[Edges] = []
     with threads(thread_count) as used:
         warm_up(problem)
-        made = with_steps_checked(
+        made = StepSample(len(position)).checked(
             provenance_of(problem, position),
             problem,
             position,
-            lambda nodes: in_order(list(find_edges(problem, position, nodes, batch_pairs))),
+            lambda nodes: find_edges(problem, position, nodes, batch_pairs),
         )
         tally = Tally(len(position), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
             parts.append(edges)
             progress(tally.add(edges))
     whole = in_order(parts)
+    values: dict[str, Any] = {n: np.ascontiguousarray(whole.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
     return Roadmap(
         position=position,
         indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
@@ -141,5 +149,5 @@ def build_roadmap(
         wall_s=tally.seconds,
         threads=used,
         node_counts=whole.counts,
-        **{name: np.ascontiguousarray(whole.values[:, n]) for n, name in enumerate(EDGE_FIELDS)},
+        **values,
     )

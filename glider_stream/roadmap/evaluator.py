@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import in_parallel
 from ..kernels import connect, control, edges, fan, flow, motion, refine, terrain
@@ -99,12 +99,24 @@ class Evaluator:
         exact = isinstance(self.steering, FlowMapMethod)
         return self if exact else replace(self, steering=FlowMapMethod())
 
-    def reach(self, position: Array, departure: float, source: Index, limit: int) -> tuple[Index, Index, Array]:
+    def reach(
+        self,
+        position: Array,
+        departure: float | Array,
+        source: Index,
+        limit: int,
+        wanted: Bools | None = None,
+    ) -> tuple[Index, Index, Array]:
         """The legs from each of the nodes `source` to whatever lies under its fan: (indptr, target, outcomes).
 
-        Only the fastest `limit` of each vertical direction, all where it is 0. Targets rise within a row.
+        `departure` [s], one for all or (sources,). Only the fastest `limit` of each vertical direction, all where
+        it is 0; of all, those to the nodes `wanted` (sources, nodes). Targets rise within a row.
         """
-        return self._reach(position, _asking_for_all(position[source], departure, False), limit)
+        points = _asking_for_all(position[source], departure, False)
+        if wanted is not None:
+            indptr = np.concatenate([[0], np.cumsum(wanted.sum(axis=1))]).astype(np.int64)
+            points = points._replace(indptr=indptr, target=np.nonzero(wanted)[1].astype(np.int64))
+        return self._reach(position, points, limit)
 
     def reach_point(self, position: Array, point: Array, departure: float, backward: bool) -> tuple[Index, Array]:
         """The nodes that lie under the fan of a `point` (3,) [m], and the legs to them: (nodes, outcomes).
@@ -126,7 +138,8 @@ class Evaluator:
         while True:
             legs = Legs(counts, np.empty((count, room, LEG_COLUMNS)))
             task = partial(reach_points, self.medium, self.steering.kernel(), nodes, points, limit, legs)
-            in_parallel(task, count, NODES_AT_ONCE)
+            # a search asks for few nodes at a time: all threads shall have some
+            in_parallel(task, count, max(1, min(NODES_AT_ONCE, count // NODES_AT_ONCE)))
             if counts.max(initial=0) <= room:
                 break
             room = int(counts.max())
@@ -182,7 +195,7 @@ def _place(point: ArrayLike, t: float) -> Place:
     return Place(x, y, z, float(t))
 
 
-def _asking_for_all(position: Array, departure: float, backward: bool) -> Points:
+def _asking_for_all(position: Array, departure: float | Array, backward: bool) -> Points:
     """Points (n, 3) [m] that ask for all nodes under their fans."""
     nobody = np.empty(0, np.int64)
     places = np.require(position, np.float64, ["C", "W"])

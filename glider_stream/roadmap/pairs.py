@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..water.inspect import is_steady
 from .evaluator import Evaluator
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
@@ -40,12 +40,19 @@ class Legs(Protocol):
         """Some number of pairs that a node makes, to cut work by."""
         ...
 
-    def of(self, source: Index) -> Found:
-        """Pairs from the nodes `source`."""
+    def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
+        """Pairs from the nodes `source`, no node twice, left at `departure` (sources,) [s] or at the problem's.
+
+        Where `wanted` (sources, nodes) is given, others may be left out.
+        """
         ...
 
-    def away(self, point: Array) -> Attached:
-        """Pairs from a point (3,) [m] to nodes."""
+    def away(self, point: Array, departure: float | None = None) -> Attached:
+        """Pairs from a point (3,) [m] to nodes, left at `departure` [s] or at the problem's."""
+        ...
+
+    def before(self, point: Array) -> Index:
+        """The nodes, rising, from which a leg to a point (3,) [m] is looked for."""
         ...
 
     def towards(self, point: Array) -> Attached:
@@ -73,29 +80,35 @@ class NeighbourLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """As Legs says: the most of some nodes, far apart in the order."""
+        """The most pairs that one of some nodes makes; these nodes lie far apart in the order."""
         some = np.linspace(0, len(self.position) - 1, SAMPLED).astype(np.int64)
         return max(1, *(len(self.neighbourhood.of(self.position[n])) for n in some))
 
-    def of(self, source: Index) -> Found:
+    def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
         """As Legs says."""
-        indptr, target = as_csr([self.neighbourhood.of(self.position[n]) for n in source])
-        outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
+        rows = [self.neighbourhood.of(self.position[n]) for n in source]
+        if wanted is not None:
+            rows = [row[some[row]] for row, some in zip(rows, wanted, strict=True)]
+        indptr, target = as_csr(rows)
+        departs = self.departure if departure is None else _by_node(self.position, source, departure)
+        outcomes = self.evaluator.connect(self.position, departs, source, indptr, target)
         return Found(indptr, target, outcomes)
 
-    def away(self, point: Array) -> Attached:
+    def away(self, point: Array, departure: float | None = None) -> Attached:
         """As Legs says."""
         nodes = self.neighbourhood.of(point)
-        position = np.vstack([self.position[nodes], point])
-        here, others = len(nodes), np.arange(len(nodes))
-        return Attached(nodes, self.evaluator.connect(position, self.departure, [here], [0, here], others))
+        return _from_point(self.evaluator, self.position, nodes, point, _or(departure, self.departure))
+
+    def before(self, point: Array) -> Index:
+        """As Legs says."""
+        return self.neighbourhood.of(point)
 
     def towards(self, point: Array) -> Attached:
-        """As Legs says; by one fan backward in time where the method and the flow allow it."""
+        """Pairs from nodes to a point (3,) [m]; by one fan backward in time where method and flow allow it."""
         nodes = self.neighbourhood.of(point)
         if self.evaluator.flies_backward:
-            there, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
-            return Attached(nodes[there], outcomes)
+            found, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
+            return Attached(nodes[found], outcomes)
         return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
 
 
@@ -114,34 +127,55 @@ class ReachableLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """As Legs says."""
+        """Twice the limit; all nodes where no limit is set."""
         return 2 * self.limit if self.limit else len(self.position)
 
-    def of(self, source: Index) -> Found:
-        """As Legs says."""
-        indptr, target, outcomes = self._fan.reach(self.position, self.departure, source, self.limit)
+    def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
+        """As Legs says; with a limit the fastest are found among all."""
+        departs = self.departure if departure is None else departure
+        some = wanted if self.limit == 0 else None
+        indptr, target, outcomes = self._fan.reach(self.position, departs, source, self.limit, some)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
-            outcomes = self.evaluator.connect(self.position, self.departure, source, indptr, target)
+            departs = self.departure if departure is None else _by_node(self.position, source, departure)
+            outcomes = self.evaluator.connect(self.position, departs, source, indptr, target)
         return Found(indptr, target, outcomes)
 
-    def away(self, point: Array) -> Attached:
+    def away(self, point: Array, departure: float | None = None) -> Attached:
         """As Legs says; all that are reached."""
-        nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, False)
+        departs = _or(departure, self.departure)
+        nodes, outcomes = self._fan.reach_point(self.position, point, departs, False)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
-            position, here = np.vstack([self.position[nodes], point]), len(nodes)
-            others = np.arange(here)
-            outcomes = self.evaluator.connect(position, self.departure, [here], [0, here], others)
+            return _from_point(self.evaluator, self.position, nodes, point, departs)
         return Attached(nodes, outcomes)
 
+    def before(self, point: Array) -> Index:
+        """As Legs says; all at other depths."""
+        return np.flatnonzero(self.position[:, 2] != point[2])
+
     def towards(self, point: Array) -> Attached:
-        """As Legs says; all that reach it."""
+        """Pairs to a point (3,) [m] from all nodes that reach it."""
         if not is_steady(self.evaluator.flow):
-            nodes = np.flatnonzero(self.position[:, 2] != point[2])
-            return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
+            return _each_towards(self.evaluator, self.position, self.before(point), point, self.departure)
         nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, True)
         if not isinstance(self.evaluator.steering, FlowMapMethod):
             return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
         return Attached(nodes, outcomes)
+
+
+def _or(departure: float | None, usual: float) -> float:
+    return usual if departure is None else departure
+
+
+def _by_node(position: Array, source: Index, departure: Array) -> Array:
+    """Departures [s] of some nodes as the evaluator takes them: one for every node, others' never read."""
+    departs = np.zeros(len(position))
+    departs[source] = departure
+    return departs
+
+
+def _from_point(evaluator: Evaluator, position: Array, nodes: Index, point: Array, departure: float) -> Attached:
+    places, here = np.vstack([position[nodes], point]), len(nodes)
+    return Attached(nodes, evaluator.connect(places, departure, [here], [0, here], np.arange(here)))
 
 
 def _each_towards(

@@ -2,8 +2,10 @@
 
 import hashlib
 import platform
+import tomllib
 from datetime import UTC, datetime
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from ..base.settings import require
 from ..kernels.cache import KERNEL_DIGEST
 from ..vehicle.polar import glider_sha256
 from ..water.inspect import flow_sha256
+from .inputs import inputs_of, names_of
 from .problem import Problem
 from .roadmap import Provenance, Roadmap
 
@@ -21,8 +24,9 @@ def lonlat_of(problem: Problem, position: Array) -> Array | None:
     return None if problem.to_lonlat is None else problem.to_lonlat(position)
 
 
-def provenance_of(problem: Problem, position: Array) -> Provenance:
-    """What a roadmap of this problem, with nodes (n, 3) [m], is made by, now."""
+def provenance_of(problem: Problem, position: Array, folder: Path | None = None) -> Provenance:
+    """What a roadmap of this problem, with nodes (n, 3) [m], in a file in `folder`, is made by, now."""
+    names = names_of(tomllib.loads(problem.scenario))
     return Provenance(
         scenario=problem.scenario,
         flow=problem.flow_words,
@@ -37,6 +41,7 @@ def provenance_of(problem: Problem, position: Array) -> Provenance:
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         software_version=version("glider-stream"),
         cost_unit=problem.evaluator.cost.unit,
+        inputs=inputs_of(names, (folder or Path()).absolute()),
         libraries=", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
         machine=f"{platform.node()}, {platform.machine()}, Python {platform.python_version()}",
     )

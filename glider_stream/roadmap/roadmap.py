@@ -1,7 +1,9 @@
 """The roadmap: nodes, the legs between them, and how it is built."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
 from ..kernels.edges import Status
+from .inputs import settings_sha256
 
 EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
 
@@ -32,19 +35,19 @@ class Provenance:
     libraries: str = ""
     machine: str = ""
     cost_unit: str = "s"
+    inputs: str = ""
     steps: str = ""
 
     def identity(self) -> dict[str, str]:
-        """What two roadmaps, or parts of one, must share to hold the same edges."""
+        """What two roadmaps, or parts of one, must share to hold the same edges: content, and no file's name."""
         keys = (
-            "scenario_sha256",
             "nodes_sha256",
             "flow_sha256",
             "terrain_sha256",
             "glider_sha256",
             "kernel_digest",
         )
-        return {key: getattr(self, key) for key in keys}
+        return {"scenario_sha256": settings_sha256(self.scenario)} | {key: getattr(self, key) for key in keys}
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,44 @@ class Edges:
         edges = np.repeat(chosen, self.degree)
         kept = self.source[chosen], self.degree[chosen], self.target[edges], self.values[edges]
         return Edges(*kept, self.counts[chosen])
+
+    def before(self, node: int) -> tuple["Edges", "Edges"]:
+        """Those of the nodes before `node`, and those from it on, without a copy."""
+        row = int(np.searchsorted(self.source, node))
+        edge = int(self.degree[:row].sum())
+        parts = []
+        for rows, edges in ((slice(row), slice(edge)), (slice(row, None), slice(edge, None))):
+            arrays = self.source[rows], self.degree[rows], self.target[edges], self.values[edges]
+            parts.append(Edges(*arrays, self.counts[rows]))
+        return parts[0], parts[1]
+
+    def digest(self) -> str:
+        """A digest of all that they say; "" where there is no node."""
+        if self.source.size == 0:
+            return ""
+        text = hashlib.sha256()
+        arrays = self.source, self.degree, self.target, self.values, self.counts
+        for array, (_, kind) in zip(arrays, EMPTY, strict=True):
+            text.update(np.ascontiguousarray(array, kind).tobytes())
+        return text.hexdigest()
+
+
+def by_node(parts: Iterable[Edges]) -> Iterator[Edges]:
+    """The edges of parts, which come by their first nodes, in the order of all nodes.
+
+    Parts may interleave, as a cluster finds them; no more than those that overlap are held.
+    """
+    waiting: list[Edges] = []
+    for part in parts:
+        if part.source.size == 0:
+            continue
+        split = [one.before(int(part.source[0])) for one in waiting]
+        ready = [before for before, _ in split if before.source.size]
+        if ready:
+            yield in_order(ready)
+        waiting = [*(rest for _, rest in split if rest.source.size), part]
+    if waiting:
+        yield in_order(waiting)
 
 
 def in_order(parts: Sequence[Edges]) -> Edges:
@@ -107,7 +148,16 @@ class Roadmap:
 
     `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
     (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
-    `node_counts` (n, statuses) those of each node, where the file has them.
+    `node_counts` (n, statuses) those of each node, where the file has them. `file`: where it was read from;
+    `elsewhere`: section.key=FILE for each file of its scenario that the user says is now there.
+
+    Examples:
+        >>> roadmap = glider_stream.read_roadmap("small.h5")
+        >>> roadmap.position.shape, roadmap.target.size
+        ((77, 3), 929)
+        >>> first = slice(roadmap.indptr[0], roadmap.indptr[1])
+        >>> len(roadmap.target[first]) == len(roadmap.time[first])
+        True
     """
 
     position: Array
@@ -125,6 +175,8 @@ class Roadmap:
     threads: int
     lonlat: Array | None = None
     node_counts: NDArray[np.int32] | None = None
+    file: Path | None = field(default=None, compare=False)
+    elsewhere: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def evaluated(self) -> int:

@@ -1,6 +1,6 @@
 """How far off the integration's step puts legs: a sample of them, flown again in finer steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..kernels.edges import CONNECTED, Edge
 from .problem import Problem
-from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
+from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 
 SAMPLED_NODES, SAMPLED_LEGS = 8, 64
 """The legs that are flown again: some of each of a few nodes, evenly chosen by their numbers."""
@@ -40,7 +40,8 @@ class StepError:
     def __str__(self) -> str:
         if self.legs == 0:
             return f"of {self.dt:g} s, no leg to try them on"
-        return f"of {self.dt:g} s, off by {self.off:.2g} m at most in {self.legs} legs flown again in finer steps"
+        legs = "1 leg" if self.legs == 1 else f"{self.legs} legs"
+        return f"of {self.dt:g} s, off by {self.off:.2g} m at most ({legs}, flown again in finer steps)"
 
 
 def sampled_nodes(count: int) -> Index:
@@ -62,17 +63,30 @@ def step_error(problem: Problem, start: Array, values: Array) -> StepError:
     return StepError(off, len(some), integration.dt, integration.tolerance)
 
 
-def with_steps_checked(
-    made: Provenance, problem: Problem, position: Array, find: Callable[[Index], Edges]
-) -> Provenance:
-    """What makes a roadmap, with words on its steps; InputError where they are too coarse.
+class StepSample:
+    """The legs of a few nodes of a build: those that are known already, the others found."""
 
-    `find` evaluates some of the nodes `position` (n, 3) [m].
-    """
-    edges = find(sampled_nodes(len(position)))
-    error = step_error(problem, position[np.repeat(edges.source, edges.degree)], edges.values)
-    error.check()
-    return replace(made, steps=str(error))
+    def __init__(self, count: int) -> None:
+        """Of a build of so many nodes."""
+        self.nodes = sampled_nodes(count)
+        self.parts: list[Edges] = []
+
+    def take(self, edges: Edges) -> None:
+        """Keep what an earlier run, or an older roadmap, knows of these nodes."""
+        self.parts.append(edges.of(np.isin(edges.source, self.nodes)))
+
+    def checked(
+        self, made: Provenance, problem: Problem, position: Array, find: Callable[[Index], Iterable[Edges]]
+    ) -> Provenance:
+        """What makes a roadmap, with words on its steps; InputError where they are too coarse.
+
+        `find` evaluates some of the nodes `position` (n, 3) [m].
+        """
+        missing = np.setdiff1d(self.nodes, in_order(self.parts).source)
+        edges = in_order([*self.parts, *(find(missing) if missing.size else ())])
+        error = step_error(problem, position[np.repeat(edges.source, edges.degree)], edges.values)
+        error.check()
+        return replace(made, steps=str(error))
 
 
 def check_steps(roadmap: Roadmap, problem: Problem) -> None:

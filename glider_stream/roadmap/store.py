@@ -1,6 +1,7 @@
 """The roadmap file: HDF5, format version 1. Nothing else knows h5py."""
 
 import contextlib
+import hashlib
 import io
 import os
 from collections.abc import Iterator
@@ -12,10 +13,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
+from ..base.errors import InputError, Unwritable
 from ..base.output import replacing
 from ..base.settings import require
-from ..base.untrusted import check_claim, check_links
+from ..base.terminal import plain
+from ..base.untrusted import check_claim, check_file, check_links
 from ..kernels.edges import Status
 from .builder import Tally
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
@@ -27,6 +29,8 @@ PART_FORMAT = "glider-stream/roadmap-part"
 VERSION = 1
 CHUNK = 32768
 """Edges in a chunk of a dataset, 256 kB: one is checked and cached whole."""
+CHECKED = 16 * CHUNK
+"""Rows that are read back at once when a file is checked."""
 
 _DESCRIBED = {
     "nodes/position": ("f8", "m", "node position: x east, y north, z upward from the surface"),
@@ -90,6 +94,8 @@ class RoadmapWriter:
         self._waiting: list[Edges] = []
         self._degree: list[AnyArray] = []
         self._counts: list[AnyArray] = []
+        self._next, self._last = shard.nodes(len(position))
+        self.digests: dict[str, Any] = {}
         file.attrs["format"] = FORMAT if shard.whole else PART_FORMAT
         if not shard.whole:
             file.attrs["shard"] = str(shard)
@@ -101,7 +107,14 @@ class RoadmapWriter:
             self._put("nodes/lonlat", lonlat)
 
     def append(self, edges: Edges) -> None:
-        """Take the edges of the next nodes."""
+        """Take the edges of the next nodes; RuntimeError if they are others, as only a bug hands over."""
+        follows = np.array_equal(edges.source, np.arange(self._next, self._next + edges.source.size))
+        whole = edges.degree.sum() == edges.target.size == len(edges.values)
+        if not follows or not whole:
+            raise RuntimeError(
+                f"edges of nodes from {self._next:,} on are missing, or stand twice; no file is made"
+            )
+        self._next += edges.source.size
         self._degree.append(edges.degree)
         self._counts.append(edges.counts)
         self._waiting.append(edges)
@@ -111,6 +124,8 @@ class RoadmapWriter:
     def finish(self, tally: Tally) -> None:
         """Write what is known after the edges are, and declare the file complete."""
         self._flush()
+        if self._next != self._last:
+            raise RuntimeError(f"the edges of node {self._next:,} are missing; no file is made")
         degree = np.concatenate([np.zeros(1, np.int64), *self._degree])
         self._put("edges/indptr", np.cumsum(degree))
         by_name = tally.by_name()
@@ -137,6 +152,8 @@ class RoadmapWriter:
     def _put(self, name: str, rows: AnyArray) -> None:
         """Append rows to a dataset, which is made if there is none."""
         kind, unit, words = _DESCRIBED[name]
+        rows = np.ascontiguousarray(rows, kind)
+        self.digests.setdefault(name, hashlib.blake2b()).update(rows.tobytes())
         if name in self._file:
             dataset = self._file[name]
             before = len(dataset)
@@ -146,7 +163,7 @@ class RoadmapWriter:
         # checksums need chunks, and chunks an element
         chunks = (max(1, min(CHUNK, len(rows))), *rows.shape[1:])
         more = {"maxshape": (None, *rows.shape[1:]), "chunks": chunks, "fletcher32": True}
-        dataset = self._file.create_dataset(name, data=np.asarray(rows, kind), **more)
+        dataset = self._file.create_dataset(name, data=rows, **more)
         dataset.attrs["units"] = unit
         dataset.attrs["long_name"] = words
 
@@ -158,12 +175,30 @@ def writing(
     """A roadmap file in the making; at `path` when the block ends well, and not at all else."""
     with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
         with h5py.File(disk, "w") as file:
-            yield RoadmapWriter(disk, file, position, lonlat, made, shard)
+            writer = RoadmapWriter(disk, file, position, lonlat, made, shard)
+            yield writer
         disk.check()
+        _check_written(temporary, Path(path), writer.digests)
+
+
+def _check_written(temporary: Path, path: Path, digests: dict[str, Any]) -> None:
+    """Unwritable unless a finished file reads back as it was written, to the bit: before it replaces anything."""
+    with h5py.File(temporary, "r") as file:
+        for name, digest in digests.items():
+            dataset, read = file[name], hashlib.blake2b()
+            for first in range(0, len(dataset), CHECKED):
+                read.update(dataset[first : first + CHECKED].tobytes())
+            if read.digest() != digest.digest():
+                raise Unwritable(f"the output {path} cannot be written whole: its {name} reads back otherwise")
 
 
 def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
-    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
+    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all.
+
+    Examples:
+        >>> roadmap = glider_stream.read_roadmap("small.h5")
+        >>> glider_stream.write_roadmap(roadmap, "copy.h5")
+    """
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
     nodes = len(roadmap.position)
     counts = np.zeros((nodes, len(Status)), np.int32) if roadmap.node_counts is None else roadmap.node_counts
@@ -176,7 +211,12 @@ def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
-    """Read a roadmap file; InputError where it is not one, newer, incomplete or damaged."""
+    """Read a roadmap file; InputError where it is not one, newer, incomplete or damaged.
+
+    Examples:
+        >>> glider_stream.read_roadmap("small.h5").target.size
+        929
+    """
     path = Path(path)
     with _reading(path) as file:
         _check_head(file, path, FORMAT)
@@ -187,17 +227,19 @@ def read_roadmap(path: str | Path) -> Roadmap:
         counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
         counted = min(counts.values()) >= 0
         require(counted, f"the roadmap {path} is damaged: a count of its pairs makes no sense; build it again")
+        values: dict[str, Any] = {name: arrays[f"edges/{name}"] for name in EDGE_FIELDS}
         return Roadmap(
             position=arrays["nodes/position"],
             indptr=arrays["edges/indptr"],
             target=arrays["edges/target"],
-            **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
+            **values,
             counts=counts,
             provenance=_provenance(file),
             wall_s=wall,
             threads=used,
             lonlat=arrays.get("nodes/lonlat"),
             node_counts=arrays.get("pairs/by_node"),
+            file=path,
         )
     raise AssertionError  # _reading raises
 
@@ -234,6 +276,7 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
 def _reading(path: Path) -> Iterator[h5py.File]:
     """An open file of ours; whatever its damage makes h5py raise is an InputError."""
     require(path.exists(), f"the roadmap {path} does not exist; build it first")
+    check_file(path, "the roadmap")
     try:
         check_links(path)
         with h5py.File(path, "r") as file:
@@ -272,16 +315,17 @@ def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
 def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray]:
     """The datasets by name, of the kind that they should be and no larger than the file can hold."""
     arrays: dict[str, AnyArray] = {}
-    held = path.stat().st_size
     for name in names:
         kind = _DESCRIBED[name][0]
         if name in _OPTIONAL and name not in file:
             continue
         require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
-        check_claim(path, name, file[name].shape, file[name].dtype.itemsize, held)
-        stored = np.asarray(file[name][()])
-        fits = stored.dtype.kind == np.dtype(kind).kind
-        require(fits, f"the roadmap {path} is damaged: {name} is {stored.dtype}, not {kind}; build it again")
+        dataset = file[name]
+        fits = isinstance(dataset, h5py.Dataset) and dataset.dtype.kind == np.dtype(kind).kind
+        said = getattr(dataset, "dtype", "a group")
+        require(fits, f"the roadmap {path} is damaged: {name} is {said}, not {kind}; build it again")
+        check_claim(path, name, dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
+        stored = np.asarray(dataset[()])
         arrays[name] = stored.astype(kind, copy=False)
         finite = bool(np.isfinite(arrays[name]).all())
         require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
@@ -327,4 +371,7 @@ def _provenance(file: h5py.File) -> Provenance:
     words = {
         f.name: said[f.name] if f.default is MISSING else said.get(f.name, f.default) for f in fields(Provenance)
     }
-    return Provenance(seed=int(words.pop("seed")), **{name: str(value) for name, value in words.items()})
+    seed = int(words.pop("seed"))
+    # all but these are one line each, which is printed
+    texts = {n: str(v) if n in ("scenario", "inputs") else plain(str(v)) for n, v in words.items()}
+    return Provenance(seed=seed, **texts)

@@ -1,5 +1,6 @@
 """Verification: is a roadmap what it says; its legs flown again, by its own integrator and by another."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from scipy.integrate import solve_ivp
 from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.terminal import plain
 from ..base.threads import in_parallel, threads
 from ..kernels.cache import entry_point
 from ..kernels.control import control_of, glide_speed
@@ -74,8 +76,8 @@ class Verification:
         }
 
     def __str__(self) -> str:
-        lines = [f"{self.file}: {'verified' if self.holds else 'NOT what it says'}"]
-        lines += [f"  fault: {fault}" for fault in self.faults]
+        lines = [f"{plain(self.file)}: {'verified' if self.holds else 'NOT what it says'}"]
+        lines += [f"  fault: {plain(fault)}" for fault in self.faults]
         if self.edges:
             lines.append(f"  {self.edges:,} edges flown again, {self.sample:,} of them by DOP853")
         if self.differences.size:
@@ -140,17 +142,17 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
         off[e, 1] = speed - glide_speed(medium.polar, 1 if angle > 0.0 else 0, abs(angle))
 
 
-def verify(file: str | Path, problem_of: Any, sample: int = 200) -> Verification:
+def verify(file: str | Path, problem_of: Callable[[Roadmap], Problem], sample: int = 200) -> Verification:
     """Look at a roadmap file: whole, made by the flow and glider that its scenario names, its legs as they say.
 
-    `problem_of` makes a problem of the scenario's text. All edges are flown again as they were found, a
+    `problem_of` makes the problem of a roadmap. All edges are flown again as they were found, a
     `sample` of them, all where it is 0, by DOP853 too.
     """
     require(sample >= 0, f"`sample` must be at least 0, all; got {sample}")
     require(Path(file).is_file(), f"the roadmap {file} does not exist; build it first")
     try:
         road = read_roadmap(file)
-        problem: Problem = problem_of(road.provenance.scenario)
+        problem = problem_of(road)
         check_unchanged(road, problem)
     except InputError as error:
         return Verification(str(file), 0, 0, (str(error),), np.empty(0), ())

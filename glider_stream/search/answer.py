@@ -1,33 +1,44 @@
 """What a query may ask beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs, a polish."""
 
-import math
 from dataclasses import replace
 
 from ..base.arrays import Array
 from ..base.settings import require
+from ..roadmap.builder import node_positions
 from ..roadmap.problem import Problem
+from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import Roadmap
 from ..water.inspect import is_steady
+from .assembly import RoutePlanner
+from .layered import SurfacingPlanner
 from .moves import improve
 from .path import SURFACE, Path
 from .polish import Polisher
 from .query import Planner
-from .surfacing import Surfacing, SurfacingPlanner
+from .surfacing import Surfacing
 from .thin import thin
-from .trade_off import TradeOff, trade_off
+from .time_dependent import ClockPlanner
+from .trade_off import TradeOff
 
 Ends = tuple[Array | None, Array | None]
 """Start and goal (3,) [m]; None for the scenario's own."""
 
 
-def planner_of(roadmap: Roadmap, problem: Problem, rule: Surfacing) -> Planner:
-    """The planner whose paths keep a rule of surfacing."""
-    free = rule == Surfacing()
-    return Planner(roadmap, problem) if free else SurfacingPlanner(roadmap, problem, rule)
+def planner_of(problem: Problem, roadmap: Roadmap | None, rule: Surfacing) -> RoutePlanner:
+    """The planner whose paths keep a rule of surfacing, over a roadmap, or over a scenario's nodes if None.
+
+    In a flow that changes the clock runs, and a roadmap gives its nodes alone, but where the problem is `frozen`.
+    """
+    if roadmap is None:
+        return ClockPlanner(problem, node_positions(problem), rule, problem.frozen)
+    if not is_steady(problem.evaluator.flow) and not problem.frozen:
+        check_unchanged(roadmap, problem)
+        return ClockPlanner(problem, roadmap.position, rule)
+    return Planner(roadmap, problem) if rule == Surfacing() else SurfacingPlanner(roadmap, problem, rule)
 
 
 def best_path(
-    planner: Planner,
+    planner: RoutePlanner,
     ends: Ends,
     *,
     most_energy: float | None = None,
@@ -41,34 +52,31 @@ def best_path(
     """
     both = polish and most_energy is not None
     require(not both, "a route within a bound on energy is not polished: that makes its cost less, not its time")
-    path = planner.query(*ends) if most_energy is None else _within(planner, ends, most_energy)
+    if most_energy is None:
+        path = planner.query(*ends)
+    else:
+        require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
+        _check_energy(planner)
+        path = planner.within(*ends, most_energy)
     path = polished(path, planner) if polish else path
     return path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
 
 
-def front(planner: Planner, ends: Ends) -> TradeOff:
-    """The paths that are best for some price of time against energy."""
+def front(planner: RoutePlanner, ends: Ends) -> TradeOff:
+    """Every path that no other beats both in time and in energy."""
+    _check_energy(planner)
+    return planner.front(*ends)
+
+
+def _check_energy(planner: RoutePlanner) -> None:
     unit = planner.problem.evaluator.cost.unit
-    require(unit == "J", 'the roadmap\'s cost is time, without energy; build it with [cost] kind = "energy"')
-    return trade_off(lambda blend: planner.query(*ends, blend=blend))
+    cure = 'plan, or build the roadmap, with [cost] kind = "energy"'
+    require(unit == "J", f"the cost is time, without energy; {cure}")
 
 
-def _within(planner: Planner, ends: Ends, most_energy: float) -> Path:
-    require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
-    paths = front(planner, ends)
-    within = paths.within(most_energy)
-    if within:
-        return replace(within, least_time=paths.least_time(most_energy))
-    last = paths.paths[-1]
-    if not last.found:
-        return last
-    why = f"the least that one takes is {last.cost:,.0f} J, more than {most_energy:,.0f}"
-    return replace(last, cost=math.inf, legs=(), why=why)
-
-
-def with_fewer_legs(path: Path, tolerance: float, planner: Planner, most_energy: float | None) -> Path:
+def with_fewer_legs(path: Path, tolerance: float, planner: RoutePlanner, most_energy: float | None) -> Path:
     """A path thinned, or as it is where fewer legs would break what else was asked for."""
-    rule = planner.rule if isinstance(planner, SurfacingPlanner) else Surfacing()
+    rule = planner.rule
     bound = rule != Surfacing()
     stays = (lambda stop: bool(stop[2] >= -SURFACE)) if bound else (lambda stop: False)
     fewer = thin(path, tolerance, planner.connect, planner.fly, stays)
@@ -76,19 +84,19 @@ def with_fewer_legs(path: Path, tolerance: float, planner: Planner, most_energy:
     return fewer if keeps else replace(path, unthinned=fewer.unthinned)
 
 
-def polished(path: Path, planner: Planner) -> Path:
+def polished(path: Path, planner: RoutePlanner) -> Path:
     """A path with its stops moved, its legs cut and its yos counted anew; as it is where that gains nothing.
 
-    It keeps the planner's rule of surfacing: stops at the surface stay there. InputError in a flow that changes.
+    Stops at the surface stay there where a rule of surfacing asks for them, and in a geographic scenario, where a
+    vehicle's files are made of them.
     """
-    steady = is_steady(planner.problem.evaluator.flow)
-    require(steady, "legs of this roadmap hold for one departure, and its current changes: it cannot be polished")
     if not path.legs:
         return path
-    rule = planner.rule if isinstance(planner, SurfacingPlanner) else Surfacing()
+    problem, rule = planner.problem, planner.rule
     bound = rule != Surfacing()
-    stays = (lambda stop: bool(stop[2] >= -SURFACE)) if bound else (lambda stop: False)
-    polisher = Polisher(planner.problem, stays)
+    fixed = bound or problem.to_lonlat is not None
+    stays = (lambda stop: bool(stop[2] >= -SURFACE)) if fixed else (lambda stop: False)
+    polisher = Polisher(problem, stays, frozen=planner.assembly.frozen, single_yos=not bound)
     kept = replace(path, unpolished=(len(path.legs), path.travel_time, path.cost))
     chain = polisher.chain_of(path)
     if chain is None:

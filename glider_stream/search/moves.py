@@ -35,7 +35,7 @@ def improve(polisher: Polisher, chain: Chain) -> Chain:
     if len(best.glides.time) > MOST_LEGS:
         return best
     best = _best_count(polisher, best)
-    if len(best.glides.time) <= MOST_SINGLE:
+    if polisher.single_yos and len(best.glides.time) <= MOST_SINGLE:
         best = _with_more_yos(polisher, best)
     for _ in range(MOST_CUTS):
         if 2 * len(best.glides.time) > MOST_LEGS:

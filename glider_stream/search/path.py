@@ -14,6 +14,7 @@ from ..base.arrays import Array
 from ..base.clock import moment, span
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
 
 MOST_TEXT = 200_000_000
@@ -22,6 +23,8 @@ LARGEST = 1e12
 """A number [m, s] in a path file beyond it is no place or time on Earth."""
 SURFACE = 10.0
 """A leg that ends no deeper [m] ends at the surface."""
+FROZEN = "FROZEN: every leg meets the current of the departure, so these times and places do not hold"
+"""What every output says of a path whose clock does not run."""
 Hop = tuple[Array, Array, Edge]
 """A leg as searches have it: from, to (3,) [m], and the edge between them."""
 
@@ -33,6 +36,13 @@ class Leg:
     `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
     Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
     trajectory, and `north` [rad], true north counter-clockwise from the frame's +y. `cost`: its own.
+
+    Examples:
+        >>> leg = road.query().legs[0]
+        >>> bool(leg.end[2] < leg.start[2]), leg.glide_angle < 0
+        (True, True)
+        >>> round(leg.compass, 1)
+        137.5
     """
 
     start: Array
@@ -87,10 +97,18 @@ class Path:
 
     From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
     `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, and `why_not`, the same
-    for JSON, if that is known; `notes` on files written of it.
-    `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds
-    and what cost before it was polished. `least_time` [s]: no path within the
-    bound on energy that was asked for takes less.
+    for JSON, if that is known; `notes` on files written of it. `departure` [s]: the flow's time at which it
+    begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
+    `expanded`: the share of the nodes from which the search looked for legs, where it did.
+    `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds and
+    what cost before it was polished.
+
+    Examples:
+        >>> path = road.query()
+        >>> path.found, len(path.legs), path.unit
+        (True, 4, 's')
+        >>> path.trajectory.shape[1]
+        4
     """
 
     start: Array
@@ -103,9 +121,23 @@ class Path:
     why: str = ""
     unthinned: tuple[int, float] | None = None
     unpolished: tuple[int, float, float] | None = None
-    least_time: float | None = None
     why_not: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
+    departure: float | None = None
+    frozen: bool = False
+    expanded: float | None = None
+
+    @property
+    def clock_runs(self) -> bool:
+        """Whether each leg meets the current of the time at which it begins; all are alike in a steady flow."""
+        return self.departure is not None and not self.frozen
+
+    def water_times(self, leg: Leg, departure: float) -> Array:
+        """The times [s] (m,) of the flow at which a leg's rows were flown; from `departure` if frozen."""
+        since = leg.trajectory[:, 0]
+        if self.departure is not None and not self.frozen:
+            return np.asarray(self.departure + since)
+        return np.asarray(departure + since - since[0])
 
     @property
     def found(self) -> bool:
@@ -135,7 +167,8 @@ class Path:
             **energy,
             **thinned,
             **self._before_polishing(),
-            **({} if self.least_time is None else {"least_time_s": self.least_time}),
+            **({} if self.departure is None else {"departure_s": self.departure, "frozen": self.frozen}),
+            **({} if self.expanded is None else {"expanded_share": self.expanded}),
             **({} if self.found or not self.why else {"why": self.why}),
             **({} if self.why_not is None else {"why_not": dict(self.why_not)}),
             **({"notes": list(self.notes)} if self.notes else {}),
@@ -156,19 +189,19 @@ class Path:
             start, goal = (f"({lon:.4f}, {lat:.4f}, {0.0 - z:.6g} m)" for (lon, lat), (_, _, z) in ends)
         if not self.found:
             why = self.why or "more nodes, neighbours or candidates may find one"
-            return f"no path from {start} to {goal}; {why}"
+            return f"no path from {start} to {goal}; {why}" + (f"; {FROZEN}" if self.frozen else "")
         count = f"{len(self.legs)} leg{'' if len(self.legs) == 1 else 's'}"
         arrives = "" if self.departs is None else f", arrives {moment(self.departs, self.travel_time)}"
         energy = f", {self.cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         title = f"path from {start} to {goal}: {count}, {span(self.travel_time)}{arrives}{energy}"
-        if self.least_time is not None:
-            title += f"; no path within the bound takes less than {span(self.least_time)}"
         if self.unthinned is not None:
             title += f"; before it was thinned {self.unthinned[0]}, {span(self.unthinned[1])}"
         if self.unpolished is not None:
             legs, time, cost = self.unpolished
             title += f"; before it was polished {legs}, {span(time)}"
             title += f", {cost / 1000:,.1f} kJ" if self.unit == "J" else ""
+        if self.frozen:
+            title += f"; {FROZEN}"
         return "\n".join([title, *(f"  {leg.told(self.departs)}" for leg in self.legs)])
 
 
@@ -191,6 +224,7 @@ def load_path(file: str | File) -> Path:
     try:
         size = File(file).stat().st_size
         require(size <= MOST_TEXT, f"it holds {size:,} bytes, more than a path needs ({MOST_TEXT:,})")
+        check_file(file, "the path")
         table = json.loads(File(file).read_text(encoding="utf-8"))
         require(isinstance(table, dict) and isinstance(table.get("legs"), list), "it has no list `legs`")
         require(len(table["legs"]) > 0, "it holds no leg, so there is nothing to draw")
@@ -207,7 +241,9 @@ def load_path(file: str | File) -> Path:
         elif isinstance(error, InputError):
             said = str(error)
         raise InputError(f"the path file {file} cannot be read: {said}; write it with `query -o`") from None
-    return Path(legs[0].start, legs[-1].end, cost, legs)
+    departure = float(_numbers(table, "departure_s", "the path")) if "departure_s" in table else None
+    frozen = table.get("frozen") is True
+    return Path(legs[0].start, legs[-1].end, cost, legs, departure=departure, frozen=frozen)
 
 
 def _read_leg(leg: Any, where: str) -> Leg:

@@ -56,10 +56,16 @@ class Chain(NamedTuple):
 
 @dataclass(frozen=True)
 class Polisher:
-    """Makes routes of a problem better. `stays` says of a stop whether it keeps its depth."""
+    """Makes routes of a problem better.
+
+    `stays` says of a stop whether it keeps its depth; `frozen`: every leg meets the current of the departure;
+    `single_yos`: whether yos may be put into single legs, with a top under water.
+    """
 
     problem: Problem
     stays: Callable[[Array], bool] = lambda stop: False
+    frozen: bool = False
+    single_yos: bool = True
 
     @property
     def air(self) -> Air:
@@ -67,8 +73,10 @@ class Polisher:
         return Air(self.problem.evaluator)
 
     def glide(self, stops: Array, angle: Array, heading: Array) -> Glides:
-        """The legs between stops, each leaving when the last one arrives."""
-        return self.air.glide(stops[:-1], stops[1:], angle, heading, self.problem.departure)
+        """The legs between stops, each leaving when the last one arrives, or all alike if frozen."""
+        departs = self.problem.departure
+        left = np.full(len(angle), departs) if self.frozen else departs
+        return self.air.glide(stops[:-1], stops[1:], angle, heading, left)
 
     def chain(self, stops: Array, angle: Array, heading: Array) -> Chain | None:
         """The route through stops, from a guess of its controls; None where it cannot be flown."""
@@ -164,6 +172,7 @@ class Polisher:
         integration = self.problem.evaluator.integration
         short = np.abs(np.diff(stops[:, 2])) < min(LEAST_RISE, 0.5)
         late = glides.time > integration.dt * integration.steps
+        late |= glides.departs + glides.time > self.problem.evaluator.flow.extent.t_hi
         fits = glides.exact & ~short & ~late & np.isfinite(glides.time)
         return self.air.fit(stops[:-1], stops[1:], glides) if fits.all() else np.asarray(fits, np.bool_)
 
@@ -195,7 +204,7 @@ class Polisher:
     def _turns(self, stops: Array) -> NDArray[np.bool_]:
         """At which legs' starts (n,) a dive turns into a climb; a route begins as if it had dived."""
         climbs = np.diff(stops[:, 2]) > 0
-        return climbs & ~np.concatenate([[False], climbs[:-1]])
+        return np.asarray(climbs & ~np.concatenate([[False], climbs[:-1]]), np.bool_)
 
     def _pumped(self, z: Array) -> Array:
         pumped = self.problem.evaluator.cost.inflection(z)
@@ -220,7 +229,8 @@ class _Step:
         # what a second's delay at each leg's end costs: the legs after it leave later
         late = np.zeros(len(glides.time) + 1)
         for n in range(len(glides.time) - 1, -1, -1):
-            late[n] = late[n + 1] + (price + late[n + 1]) * slopes.time[n, 6]
+            by_delay = 0.0 if polisher.frozen else slopes.time[n, 6]
+            late[n] = late[n + 1] + (price + late[n + 1]) * by_delay
         worth = price + late[1:]
         room, by = polisher._room(stops, glides, slopes)
         leg = worth[:, None] * slopes.time[:, :6] - weight * (by / room[:, :, None]).sum(axis=1)

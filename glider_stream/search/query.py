@@ -13,20 +13,21 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Index
-from ..base.settings import require
 from ..kernels.edges import COST, GLIDE_ANGLE, STATUS, TIME, Edge, Status, edge_of
 from ..roadmap.pairs import Attached, Legs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
 from ..roadmap.step_error import check_steps
-from ..water.frame import true_north
-from .path import Leg, Path
+from .assembly import RoutePlanner, nodes_at, placed_end
+from .expansion import Fan
+from .labels import Aim, LabelSearch
+from .least_time import fastest_sink
+from .path import Hop, Path
+from .surfacing import Surfacing
+from .trade_off import LeftInRoadmap, RoadmapEnds, RoadmapExpansion, TradeOff
 from .why_not import why_not
 
-EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
-FLOWN_AGAIN = 0.1
-"""By how much a leg that is flown again may miss by more than the tolerance, in tolerances: as in verify."""
 NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 
 
@@ -67,15 +68,26 @@ class _Search:
     before: NDArray[np.int32]
 
 
-class Planner:
-    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is."""
+class Planner(RoutePlanner):
+    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is.
 
-    def __init__(self, roadmap: Roadmap, problem: Problem) -> None:
+    Examples:
+        >>> planner = glider_stream.Planner(road.roadmap, road.problem)
+        >>> planner.query(np.array([-190.0, 190.0, 0.0]), np.array([100.0, -100.0, -75.0])).found
+        True
+    """
+
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        problem: Problem,
+        rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
+    ) -> None:
         """Check that flow and glider are those that the roadmap was built with."""
         check_unchanged(roadmap, problem)
         check_steps(roadmap, problem)
         self.roadmap = roadmap
-        self.problem = problem
+        super().__init__(problem, rule, frozen=True)
         self._kept: tuple[Blend, Array] | None = None
         self._turn_by_turn = Lock()
 
@@ -114,31 +126,41 @@ class Planner:
         nodes = len(self.roadmap.position)
         return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
 
+    def front(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+    ) -> TradeOff:
+        """As RoutePlanner."""
+        rule = self.rule
+        begin, end = self._start(start), self._goal(goal)
+        for place, name in ((begin.point, "start"), (end.point, "goal")):
+            rule.check_end(place, name)
+        if np.array_equal(begin.point, end.point):
+            return TradeOff((self._path(begin.point, end.point, []),))
+        direct = self._direct(begin, [end])[0]
+        legs = [None if one.legs is None else Fan(one.legs.nodes, one.legs.outcomes) for one in (begin, end)]
+        ends = RoadmapEnds(begin.point, end.point, begin.nodes, end.nodes, legs[0], legs[1], direct)
+        expansion, evaluator, departure = RoadmapExpansion(self.roadmap, ends), self.problem.evaluator, 0.0
+        left = LeftInRoadmap(expansion, fastest_sink(evaluator.polar))
+        aim = Aim(front=True)
+        search = LabelSearch(expansion, evaluator.cost, rule, left, expansion.goals, departure, aim)
+        found = [n for n in search.settled() if search.is_goal[search.labels[n].place]]
+        if not found:
+            return TradeOff((self.assembly.no_path(begin.point, end.point),))
+        return TradeOff(tuple(self._path(begin.point, end.point, search.hops(n)) for n in found))
+
     def _reached(self, start: Array) -> tuple[Array, Array]:
         """The nodes' places (n, 3) [m], and when each can be reached from a start at the soonest (n,) [s]."""
         return self.roadmap.position, self.arrivals(start)
 
-    def connect(self, start: Array, end: Array) -> Edge:
-        """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.
+    def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
+        """As RoutePlanner."""
+        return self.front(start, goal).within(most_cost)
 
-        A line or a surface of controls finds few of the glides that there are; what it says of a pair that
-        the flow map does not join either stays.
-        """
-        evaluator, departure = self.problem.evaluator, self.problem.departure
-        edge = evaluator.connect_pair(start, end, departure)
-        if edge.status in EXACT_MAY_FIND and evaluator.by_fan() is not evaluator:
-            exact = evaluator.by_fan().connect_pair(start, end, departure)
-            return exact if exact.status == Status.CONNECTED else edge
-        return edge
-
-    def fly(self, hops: list[tuple[Array, Array, Edge]]) -> Path:
-        """The path of some legs, from, to, edge, flown again; InputError where one does not end where it says."""
-        path = self._path(hops[0][0], hops[-1][1], hops)
-        most = (1 + FLOWN_AGAIN) * self.problem.evaluator.integration.tolerance
-        for n, leg in enumerate(path.legs, 1):
-            off = math.dist(leg.trajectory[-1, 1:], leg.end)
-            require(off <= most, f"leg {n} ends {off:.1f} m from where it should; `verify` the roadmap")
-        return path
+    def leaving(self, since: float) -> "Planner":
+        """The planner itself: its legs are the same at any time."""
+        return self
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
         """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
@@ -159,10 +181,6 @@ class Planner:
     def _turn(self, search: _Search, z: float) -> float:
         cost = self.problem.evaluator.cost.inflection(z)
         return 0.0 if cost is None else search.blend.cost * float(cost)
-
-    @property
-    def _unit(self) -> str:
-        return self.problem.evaluator.cost.unit
 
     def _alone(self, search: _Search, leg: Edge) -> float:
         """The cost of the leg from end to end; inf where there is none. It begins after a dive, as it were."""
@@ -185,13 +203,8 @@ class Planner:
 
     def _place(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
         """The nodes that lie at an end of the query, often none, and where it is."""
-        if point is None:
-            require(named is not None, f"the scenario names no {name}; give one with --{name} X,Y,Z")
-            point = named
-        place = np.asarray(point, np.float64)
-        require(place.shape == (3,), f"`{name}` must be three numbers X,Y,Z; got {place.tolist()}")
-        self.problem.check_point(place, name)
-        return np.flatnonzero((self.roadmap.position == place).all(axis=1)), place
+        place = placed_end(self.problem, point, named, name)
+        return nodes_at(self.roadmap.position, place), place
 
     @cached_property
     def _graph(self) -> tuple[Index | slice, NDArray[np.int32], NDArray[np.int32], Array | None]:
@@ -271,8 +284,8 @@ class Planner:
         if self._alone(search, direct) < cost:
             return self._path(start_at, goal_at, [(start_at, goal_at, direct)])
         if not math.isfinite(cost):
-            return Path(start_at, goal_at, math.inf, (), self._lonlat(start_at, goal_at), self.problem.departs)
-        hops: list[tuple[Array, Array, Edge]] = []
+            return self.assembly.no_path(start_at, goal_at)
+        hops: list[Hop] = []
         if leg is not None:
             hops.append((self._where(search, state), goal_at, leg))
         while state != search.origin:
@@ -314,37 +327,8 @@ class Planner:
         n = int(self.roadmap.indptr[source] + np.flatnonzero(self.roadmap.target[row] == target)[0])
         return Edge(int(Status.CONNECTED), *(float(getattr(self.roadmap, name)[n]) for name in EDGE_FIELDS))
 
-    def _cost(self, hops: list[tuple[Array, Array, Edge]]) -> float:
-        """The scenario's own cost of some legs, their turns included."""
-        dived, turns = True, 0.0
-        for source, _, edge in hops:
-            climbs = edge.glide_angle > 0
-            turn = self.problem.evaluator.cost.inflection(source[2]) if climbs and dived else None
-            turns, dived = turns + (0.0 if turn is None else float(turn)), not climbs
-        return sum(edge.cost for _, _, edge in hops) + turns
-
-    def _path(self, start: Array, goal: Array, hops: list[tuple[Array, Array, Edge]]) -> Path:
-        legs, clock = [], 0.0
-        for source, target, edge in hops:
-            rows = self.problem.evaluator.trace(source, edge, self.problem.departure)
-            rows[:, 0] += clock - self.problem.departure
-            control = edge.glide_angle, edge.heading, edge.speed
-            ends, track = self._lonlat(source, target), self._lonlat(*rows[:, 1:])
-            north = self._north(source)
-            legs.append(
-                Leg(source, target, *control, clock, edge.time, edge.miss, rows, ends, track, north, edge.cost)
-            )
-            clock += edge.time
-        cost = self._cost(hops)
-        return Path(start, goal, cost, tuple(legs), self._lonlat(start, goal), self.problem.departs, self._unit)
-
-    def _north(self, point: Array) -> float:
-        to_lonlat = self.problem.to_lonlat
-        return 0.0 if to_lonlat is None else true_north(to_lonlat, point)
-
-    def _lonlat(self, *points: Array) -> Array | None:
-        to_lonlat = self.problem.to_lonlat
-        return None if to_lonlat is None else to_lonlat(np.stack(points))
+    def _path(self, start: Array, goal: Array, hops: list[Hop]) -> Path:
+        return self.assembly.path(start, goal, hops)
 
 
 def _connected(attached: Attached) -> Attached:

@@ -1,5 +1,6 @@
 """Thinning: fewer legs, each flown again before it is believed."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -11,11 +12,13 @@ from ..base.settings import require
 from ..kernels.edges import Edge, Status
 from .path import Hop, Path, hops_of
 
+NO_LEG = Edge(int(Status.NO_HIT), *[math.nan] * 6)
+
 
 def thin(
     path: Path,
     tolerance: float,
-    connect: Callable[[Array, Array], Edge],
+    connect: Callable[[Array, Array, float], Edge],
     fly: Callable[[list[Hop]], Path],
     stays: Callable[[Array], bool] = lambda stop: False,
 ) -> Path:
@@ -23,32 +26,60 @@ def thin(
 
     A stretch becomes one leg where no stop of it lies further away from the straight line, and where one
     glide joins its ends: `connect` says so. Else it is cut at its farthest stop. `fly` makes a path of legs,
-    those that stay flown again, too. A stop that `stays` is never left out.
+    those that stay flown again, too. A stop that `stays` is never left out. With the clock running every leg
+    behind one that is new begins at another time: `connect`, which takes the seconds since departure, finds it
+    anew.
     """
     require(0 <= tolerance < np.inf, f"a route is thinned to 0 m or more; got {tolerance:g}")
     if not path.legs:
         return path
     old = hops_of(path)
+    apart: set[tuple[int, int]] = set()
+    while True:
+        hops, joined, whole = _joined(path, old, tolerance, connect, stays, apart)
+        if whole:
+            return replace(fly(hops), unthinned=(len(old), path.travel_time))
+        # who comes sooner or later may find no way on: then the last stretch that became one leg must not
+        apart.add(joined[-1])
+
+
+def _joined(
+    path: Path,
+    old: list[Hop],
+    tolerance: float,
+    connect: Callable[[Array, Array, float], Edge],
+    stays: Callable[[Array], bool],
+    apart: set[tuple[int, int]],
+) -> tuple[list[Hop], list[tuple[int, int]], bool]:
+    """The legs of a thinned route, the stretches that became one leg but for those `apart`, and if all go on."""
     stops = [old[0][0], *(end for _, end, _ in old)]
     hops: list[Hop] = []
+    joined: list[tuple[int, int]] = []
+    clock = 0.0
     # stretches that wait, the next one last: a route may be longer than Python's stack is deep
     fixed = [0, *(n for n in range(1, len(old)) if stays(stops[n])), len(old)]
     waiting = list(pairwise(fixed))[::-1]
     while waiting:
         first, last = waiting.pop()
         if last - first == 1:
-            hops.append(old[first])
-            continue
-        off = _distances(np.array(stops[first + 1 : last]), stops[first], stops[last])
-        if off.max() <= tolerance:
-            edge = connect(stops[first], stops[last])
-            if edge.status == Status.CONNECTED:
-                hops.append((stops[first], stops[last], edge))
+            edge = old[first][2]
+            if path.clock_runs and clock != path.legs[first].depart:
+                edge = connect(stops[first], stops[last], clock)
+                if edge.status != Status.CONNECTED:
+                    return hops, joined, False
+        else:
+            off = _distances(np.array(stops[first + 1 : last]), stops[first], stops[last])
+            near = off.max() <= tolerance and (first, last) not in apart
+            edge = connect(stops[first], stops[last], clock) if near else NO_LEG
+            if edge.status != Status.CONNECTED:
+                # where all lie on the line the middle is as good a cut as any, and leaves less to try
+                cut = first + 1 + (int(off.argmax()) if off.max() > 0 else len(off) // 2)
+                waiting += [(cut, last), (first, cut)]
                 continue
-        # where all lie on the line the middle is as good a cut as any, and leaves less to try
-        cut = first + 1 + (int(off.argmax()) if off.max() > 0 else len(off) // 2)
-        waiting += [(cut, last), (first, cut)]
-    return replace(fly(hops), unthinned=(len(old), path.travel_time))
+            joined.append((first, last))
+        hops.append((stops[first], stops[last], edge))
+        clock += edge.time
+    return hops, joined, True
 
 
 def _distances(points: Array, start: Array, end: Array) -> Array:

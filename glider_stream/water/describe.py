@@ -1,19 +1,24 @@
 """What a current file holds and what the planner takes for what, before anyone trusts a route."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..base.terminal import plain
 from .frame import MAX_SCALE_ERROR, LocalFrame
 from .ocean import LonLatGrid, Names, OceanFile, divergence_ratio, index_map, read_currents, sample
+from .ocean.component import TooLargeError
+from .ocean.grid import OutsideError
 
 Place = tuple[float, float, float | None, str | None]
 
 DEPTHS = (0.0, 50.0, 200.0, 500.0, 1000.0, 2000.0)
 """Depths [m] whose nearest levels are spoken of."""
+LOOK = 2e8
+"""A file that would take more memory [bytes] is read about the places that are asked for alone."""
 NEARLY_FREE = 0.35
 """Up to this ratio of divergence to vorticity a field is mesoscale; coastal ones begin near 0.45."""
 
@@ -104,8 +109,8 @@ class Description:
     def __str__(self) -> str:
         file, (dlon, dlat, east, north) = self.file, self.spacing
         nt, nz, ny, nx = file.u.shape
-        lines = [file.name]
-        lines += [f"  {key:<12}{what}" for key, what in file.took.items()]
+        lines = [plain(file.name)]
+        lines += [f"  {plain(key):<12}{plain(what)}" for key, what in file.took.items()]
         (west, east_end), (south, north_end) = file.grid.bounds
         lines.append(f"  extent      lon {west:.5g} to {east_end:.5g}, ")
         lines[-1] += f"lat {south:.5g} to {north_end:.5g}; {100 * self.land:.0f} % land"
@@ -123,7 +128,7 @@ class Description:
             lines.append(f"  at {f'{level.depth:.4g} m':<9}{speeds}{_ratio(level.divergence_ratio)}")
         lines.append(f"  divergence  {self._meaning()}")
         lines.append(f"  frame       {self._frame()}")
-        lines += [f"  note        {note}" for note in file.notes]
+        lines += [f"  note        {plain(note)}" for note in file.notes]
         for point in self.points:
             where = f"{point.lon:g}, {point.lat:g}"
             where += "" if point.depth is None else f", {point.depth:g} m"
@@ -178,11 +183,7 @@ def describe(
 
     The values are those that a planner reads. A file with several times needs the time of each place.
     """
-    file = read_currents(files, names)
-    points = []
-    for place in at:
-        current = sample(file, *place)
-        points.append(Point(*place, *((None, None) if current is None else current)))
+    file, points = _looked_at(files, at, names)
     near = dict.fromkeys(
         int(np.abs(file.depth - d).argmin()) for d in (*DEPTHS, file.depth[-1]) if d <= file.depth[-1]
     )
@@ -196,5 +197,42 @@ def describe(
         divergence_ratio=_finite(divergence_ratio(file)),
         frame_error=frame_error,
         map_error=None if frame_error > MAX_SCALE_ERROR else index_map(frame, file.grid).error,
-        points=tuple(points),
+        points=points,
     )
+
+
+def _looked_at(
+    files: str | Path | Sequence[str | Path], at: Sequence[Place], names: Names | Mapping[str, Any] | None
+) -> tuple[OceanFile, tuple[Point, ...]]:
+    """The file, and the current at some places; of a large file only what lies about these is read."""
+    if not at:
+        return read_currents(files, names), ()
+    try:
+        whole = read_currents(files, names, limit=LOOK)
+        return whole, tuple(_point(whole, place) for place in at)
+    except TooLargeError as error:
+        size = str(error).partition(" (")[0]
+    first, points = None, []
+    for place in at:
+        part = _about(files, names, place)
+        points.append(Point(*place, None, None) if part is None else _point(part, place))
+        first = first or part
+    if first is None:
+        return read_currents(files, names), tuple(points)
+    note = f"{size}: looked at about the places alone; what is said here is of the part about the first of them"
+    return replace(first, notes=(*first.notes, note)), tuple(points)
+
+
+def _about(
+    files: str | Path | Sequence[str | Path], names: Names | Mapping[str, Any] | None, place: Place
+) -> OceanFile | None:
+    """The columns about a place; None where the file does not go there."""
+    try:
+        return read_currents(files, names, lon=(place[0], place[0]), lat=(place[1], place[1]))
+    except OutsideError:
+        return None
+
+
+def _point(file: OceanFile, place: Place) -> Point:
+    current = sample(file, *place)
+    return Point(*place, *((None, None) if current is None else current))

@@ -2,6 +2,7 @@
 
 import json
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
+from ..base.errors import InputError, InputWarning
 from ..base.settings import require
 from ..kernels.terrain import Seabed
 from .frame import LocalFrame
 from .ocean.bottom import Bottom
+from .ocean.names import Names
 
 LAND = 0.0
 """The height [m] of what no glider may enter at any depth."""
@@ -26,6 +28,10 @@ MARGIN = 10.0
 """The raster keeps this far [m] from what it stands for: half a look of a leg, and what a map of a grid errs."""
 MOST_TEXT = 50_000_000
 """The most that a file of polygons may hold [bytes]."""
+MOST_VERTICES = 200_000
+"""Of one polygon, and pieces of its rim."""
+MOST_CROSSED = 300
+"""Vertices of a polygon that crosses itself: mended within a second; 3,000 took minutes and 3.7 GB."""
 SEEN, POLE = 60.0, 0.1
 """Polygons are looked at within so many degrees of longitude, and but so far from the poles."""
 DENSE = 0.02
@@ -36,13 +42,15 @@ DENSE = 0.02
 class TerrainSettings:
     """The block [terrain]: what is kept out of, beside what the current file says of its land and bottom.
 
-    `bathymetry`: a file of the bottom, `variable` and `positive` as it does not say itself; `clearance` [m]
-    above any seabed; `max_depth` [m]; `land_distance` [m] to all land; `keep_out`: files of GeoJSON polygons.
+    `bathymetry`: a file of the bottom, `variable`, `positive` and `names` (lon, lat, units, group) where it
+    does not say them itself; `clearance` [m] above any seabed; `max_depth` [m]; `land_distance` [m] to all
+    land; `keep_out`: files of GeoJSON polygons.
     """
 
     bathymetry: str | None = None
     variable: str | None = None
     positive: str | None = None
+    names: Names | None = None
     clearance: float = 0.0
     max_depth: float | None = None
     land_distance: float = 0.0
@@ -54,9 +62,11 @@ class TerrainSettings:
             require(value >= 0, f"`terrain.{name}` must be at least 0 m; got {value:g}")
         deep = self.max_depth
         require(deep is None or deep > 0, f"`terrain.max_depth` must be above 0 m; got {deep}")
-        alone = self.bathymetry is not None or (self.variable is None and self.positive is None)
+        alone = self.bathymetry is not None or (self.variable, self.positive, self.names) == (None, None, None)
         require(
-            alone, "`terrain.variable` and `terrain.positive` are of a bathymetry; name the file `bathymetry`"
+            alone,
+            "`terrain.variable`, `terrain.positive` and `terrain.names` are of a bathymetry; name the file "
+            "`bathymetry`",
         )
 
 
@@ -68,6 +78,7 @@ class Raster:
         self.frame, self.low = frame, low
         self.step = max(float((high - low).max()) / SIDE, FINEST)
         self.count = np.ceil((high - low) / self.step).astype(np.int64) + 1
+        self.ground = np.full(tuple(self.count), -np.inf)
         self.bottom = np.full(tuple(self.count), -np.inf)
         self.land = np.zeros(tuple(self.count), dtype=bool)
 
@@ -95,13 +106,17 @@ class Raster:
         first, end = (np.clip(part, 0, last).astype(np.int64) for part in (first, end))
         unknown = ((high < -0.5) | (low > last + 0.5)).any(axis=-1)
         # one window for all cells, as large as the largest needs, about the middle of each
-        size = int((end - first).max()) + 1
-        highest = maximum_filter(bottom.height, size=2 * (size // 2) + 1, mode="nearest")
+        size = 2 * (int((end - first).max() + 1) // 2) + 1
         middle = (first + end) // 2
-        here = highest[middle[..., 1], middle[..., 0]]
-        here = np.where(unknown, LAND, here)  # what a file does not hold, nobody flies over
-        self.bottom = np.maximum(self.bottom, here)
-        self.land |= here >= LAND
+
+        def highest(values: Array) -> Array:
+            here = maximum_filter(values, size=size, mode="nearest")[middle[..., 1], middle[..., 0]]
+            return np.where(unknown, LAND, here)  # what a file does not hold, nobody flies over
+
+        ground = highest(bottom.height if bottom.ground is None else bottom.ground)
+        self.ground = np.maximum(self.ground, ground)
+        self.land |= ground >= LAND
+        self.bottom = np.maximum(self.bottom, ground if bottom.ground is None else highest(bottom.height))
 
     def add_polygons(self, polygons: Sequence[Any]) -> None:
         """No depth is open in a cell that a polygon touches."""
@@ -122,7 +137,7 @@ class Raster:
 
     def seabed(self, clearance: float, max_depth: float | None, land_distance: float) -> Seabed:
         """The bottom as the kernels read it."""
-        closed = self.land | np.isposinf(self.bottom)
+        closed = self.land | (self.bottom >= LAND)
         if land_distance > 0 and self.land.any():
             from scipy.ndimage import distance_transform_edt
 
@@ -130,20 +145,28 @@ class Raster:
             near = distance_transform_edt(~self.land) * self.step - self.step * math.sqrt(0.5) <= land_distance
             closed |= near
         lowest = -np.inf if max_depth is None else -max_depth
-        bottom = np.where(closed, LAND, np.maximum(self.bottom + clearance, lowest))
+        # clearance counts from the seabed, not from where a file's data end
+        bottom = np.where(closed, LAND, np.maximum(np.maximum(self.ground + clearance, self.bottom), lowest))
         ends = self.count - 1.0
         corner = np.array([[[0.0, 0.0], [0.0, ends[1]]], [[ends[0], 0.0], [ends[0], ends[1]]]])
         per_x, per_y = 1 / (self.step * ends)
-        return Seabed(
-            np.ascontiguousarray(bottom), 0.0, corner, float(per_x), float(per_y), *map(float, self.low)
-        )
+        x_lo, y_lo = map(float, self.low)
+        bottom, ground = (np.ascontiguousarray(part) for part in (bottom, self.ground))
+        return Seabed(bottom, 0.0, corner, float(per_x), float(per_y), x_lo, y_lo, ground)
 
 
 def read_polygons(file: str | Path, frame: LocalFrame) -> list[Any]:
-    """The polygons of a GeoJSON file in the frame [m]; InputError where it holds anything else."""
+    """The polygons of a GeoJSON file in the frame [m]; InputError where it holds anything else.
+
+    An edge longer than 180 degrees is taken the short way, across the date line.
+    """
+    return [part for one in _polygons(file) for part in _in_frame(one, frame)]
+
+
+def _polygons(file: str | Path) -> list[Any]:
+    """The polygons and multipolygons of a file [degrees], as they are written."""
     try:
         import shapely
-        import shapely.affinity
         import shapely.geometry
     except ImportError:
         raise InputError("polygons need shapely, which is missing: pip install glider-stream[ocean]") from None
@@ -155,7 +178,8 @@ def read_polygons(file: str | Path, frame: LocalFrame) -> list[Any]:
         f"{path.name} holds {size:,} bytes, more than polygons need ({MOST_TEXT:,}); simplify it",
     )
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        # some editors begin a file with a byte order mark
+        table = json.loads(path.read_text(encoding="utf-8-sig"))
         found = [shapely.geometry.shape(one) for one in _geometries(table)]
     except (
         OSError,
@@ -169,23 +193,88 @@ def read_polygons(file: str | Path, frame: LocalFrame) -> list[Any]:
         said = " ".join(str(error).split())[:200]
         raise InputError(f"{path.name} is no GeoJSON of polygons: {said}; export it again") from None
     require(len(found) > 0, f"{path.name} holds no polygon; leave it out")
-    result = []
     for one in found:
         kind = one.geom_type
         require(kind in ("Polygon", "MultiPolygon"), f"{path.name} holds a {kind}: a keep-out area is a polygon")
         bounds = np.array(one.bounds if not one.is_empty else [np.nan] * 4)
         on_earth = bool((np.abs(bounds) <= [540, 90, 540, 90]).all())  # False for NaN, too
         require(on_earth, f"{path.name} holds a polygon that is empty or not in degrees; mend it")
-        flat = shapely.make_valid(shapely.force_2d(one))
-        # what is on the other side of the globe has no place in a flat frame
-        near = shapely.box(frame.lon - SEEN, -90 + POLE, frame.lon + SEEN, 90 - POLE)
-        for turn in (-720, -360, 0, 360, 720):
-            part = shapely.segmentize(shapely.affinity.translate(flat, turn, 0).intersection(near), DENSE)
-            if part.is_empty:
-                continue
+    whole = (part for one in found for part in getattr(one, "geoms", [one]))
+    return [_simple(path.name, _the_short_way(path.name, part)) for part in whole]
+
+
+def _the_short_way(name: str, polygon: Any) -> Any:
+    """A polygon [degrees] none of whose edges goes more than half around the globe; whole circles stay."""
+    import shapely
+
+    rings = []
+    for ring in (polygon.exterior, *polygon.interiors):
+        at = np.asarray(ring.coords, np.float64)[:, :2]
+        step = np.diff(at[:, 0])
+        far = (np.abs(step) > 180) & (np.abs(step) < 360)
+        lon = at[0, 0] + np.concatenate([[0.0], np.cumsum(np.where(far, step - np.sign(step) * 360, step))])
+        require(
+            abs(lon[-1] - lon[0]) < 1.0,
+            f"{name} holds a polygon that goes around a pole, from longitude {at[0, 0]:g}; cut it at a meridian",
+        )
+        rings.append(np.stack([lon, at[:, 1]], axis=-1))
+    outer = rings[0][:, 0]
+    for hole in rings[1:]:
+        hole[:, 0] += 360 * np.round((outer.min() + outer.max() - hole[:, 0].min() - hole[:, 0].max()) / 720)
+    return shapely.Polygon(rings[0], rings[1:])
+
+
+def _in_frame(polygon: Any, frame: LocalFrame) -> list[Any]:
+    """The parts of a polygon [degrees] that lie about the frame [m]."""
+    import shapely
+    import shapely.affinity
+
+    flat = shapely.make_valid(polygon)
+    # what is on the other side of the globe has no place in a flat frame
+    near = shapely.box(frame.lon - SEEN, -90 + POLE, frame.lon + SEEN, 90 - POLE)
+    result = []
+    for turn in (-720, -360, 0, 360, 720):
+        part = shapely.affinity.translate(flat, turn, 0).intersection(near)
+        fits = part.length / DENSE <= MOST_VERTICES
+        require(fits, f"a keep-out polygon has a rim of {part.length:,.0f} degrees; simplify it")
+        part = shapely.segmentize(part, DENSE)
+        if not part.is_empty:
             local = shapely.transform(part, lambda at: np.stack(frame.to_local(at[:, 0], at[:, 1]), axis=-1))
             result.append(shapely.make_valid(local))
     return result
+
+
+def _simple(name: str, polygon: Any) -> Any:
+    """A polygon that can be made valid; InputError where that would take for ever."""
+    import shapely
+
+    count = int(shapely.get_num_coordinates(polygon))
+    fits = count <= MOST_VERTICES
+    require(fits, f"{name} holds a polygon of {count:,} vertices; simplify it to {MOST_VERTICES:,}")
+    if count <= MOST_CROSSED or shapely.is_valid(polygon):
+        return polygon
+    # each crossing of two edges becomes a vertex, so their number grows with the square
+    few = f"with {count:,} vertices, too many to be mended here; give one of at most {MOST_CROSSED}, or mend it"
+    raise InputError(f"{name} holds a polygon that crosses itself, {few}")
+
+
+def _words_on(file: str, polygons: Sequence[Any], frame: LocalFrame, domain: tuple[Array, Array]) -> str:
+    """How many polygons lie in a domain [m], and their area; a warning where none does."""
+    import shapely
+
+    box = shapely.box(*domain[0][:2], *domain[1][:2])
+    inside = [part for one in polygons for part in _in_frame(one, frame) if part.intersects(box)]
+    name = Path(file).name
+    if inside:
+        area = shapely.union_all(inside).intersection(box).area / 1e6
+        return f"keep-out polygons of {name}: {len(inside)} of {len(polygons)} in the domain, {area:.3g} km2"
+    said = f"warning: the keep-out polygons of {name} touch nothing of the domain"
+    swapped = [one for one in polygons if np.abs(np.asarray(one.bounds)[[0, 2]]).max() <= 90]
+    turned = [shapely.transform(one, lambda at: at[:, ::-1]) for one in swapped]
+    if any(part.intersects(box) for one in turned for part in _in_frame(one, frame)):
+        said += ": are longitude and latitude swapped? The other way round they lie in it"
+    warnings.warn(said.removeprefix("warning: "), InputWarning, stacklevel=3)
+    return said
 
 
 def _geometries(table: Any) -> list[Any]:
@@ -200,18 +289,26 @@ def _geometries(table: Any) -> list[Any]:
 
 
 def raster_terrain(
-    settings: TerrainSettings, frame: LocalFrame, low: Array, high: Array, bottoms: Sequence[Bottom]
+    settings: TerrainSettings,
+    frame: LocalFrame,
+    low: Array,
+    high: Array,
+    bottoms: Sequence[Bottom],
+    domain: tuple[Array, Array] | None = None,
 ) -> tuple[Seabed, str]:
-    """Terrain over a box of the frame, from `low` to `high` (2,) [m], of bottoms and polygons; words on it."""
+    """Terrain over a box of the frame, from `low` to `high` (2,) [m], of bottoms and polygons; words on it.
+
+    `domain`: the corners [m] of the part that is planned in, if that is smaller.
+    """
     raster = Raster(frame, low, high)
     words = []
     for bottom in bottoms:
         raster.add_bottom(bottom)
         words.append(bottom.words)
     for file in settings.keep_out:
-        polygons = read_polygons(file, frame)
-        raster.add_polygons(polygons)
-        words.append(f"keep-out polygons of {Path(file).name}")
+        polygons = _polygons(file)
+        raster.add_polygons([part for one in polygons for part in _in_frame(one, frame)])
+        words.append(_words_on(file, polygons, frame, domain or (low, high)))
     for what, value in (("clearance", settings.clearance), ("distance from land", settings.land_distance)):
         words += [f"{what} {value:g} m"] if value else []
     words += [] if settings.max_depth is None else [f"no deeper than {settings.max_depth:g} m"]

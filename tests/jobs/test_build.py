@@ -183,10 +183,10 @@ def test_two_builds_at_once(place):
         assert not Path("road.h5.journal").exists()
         first.kill()
         first.wait()
-    assert Path("road.h5.lock").exists()  # stale
+    assert Path("road.h5.glider-stream.lock").exists()  # stale
     build_file(problem(place), "road.h5")
     assert read_roadmap("road.h5").target.size > 100
-    assert not Path("road.h5.lock").exists()
+    assert not Path("road.h5.glider-stream.lock").exists()
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 77, 100])

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from helpers.builds import datasets
+from helpers.forecasts import SCENARIO, write
 from helpers.small import command, scenario_file
 
 from glider_stream import planner
@@ -12,41 +12,8 @@ from glider_stream.base.errors import InputError
 from glider_stream.jobs.reuse import untouched
 from glider_stream.scenario import read_scenario
 
-xr = pytest.importorskip("xarray")
+pytest.importorskip("xarray")
 
-SCENARIO = """\
-[flow]
-kind = "netcdf"
-file = "a.nc"
-
-[glider]
-preset = "slocum"
-
-[domain]
-lon = [10.2, 10.6]
-lat = [40.2, 40.5]
-depth = [0.0, 900.0]
-
-[sampling]
-kind = "halton"
-count = 500
-seed = 1
-
-[neighbours]
-kind = "nearest"
-k = 12
-
-[steering]
-method = "flow-map"
-
-[integration]
-dt = 60.0
-steps = 120
-tolerance = 150.0
-
-[cost]
-kind = "time"
-"""
 LAWS = {
     "flow map": [],
     "refined": ["steering.method=streamline", "steering.candidates=16", "steering.refine=true"],
@@ -54,29 +21,6 @@ LAWS = {
     "reachable": ["neighbours.kind=reachable"],
     "radius": ["neighbours.kind=radius", "neighbours.radius=1500.0"],
 }
-
-
-def write(name, change=None, dry=None):
-    lon, lat = np.arange(10.0, 10.81, 0.01), np.arange(40.0, 40.71, 0.01)
-    depth = np.array([0.0, 100.0, 300.0, 1000.0])
-    z, y, x = np.meshgrid(depth, lat, lon, indexing="ij")
-    u = 0.25 * np.sin(9 * x) * np.cos(7 * y) * np.exp(-z / 400)
-    v = 0.2 * np.cos(8 * x + 5 * y) * np.exp(-z / 300)
-    if change is not None:
-        inside = (x < 10.29) & (y < 40.28) if change < 1 else (x > 10.5) & (y > 40.42)
-        u, v = np.where(inside, change * u, u), np.where(inside, change * v, v)
-    if dry is not None:
-        u = np.where((x > 10.5) & (y > 40.42) & (z > dry), np.nan, u)
-    dims = ("depth", "lat", "lon")
-    data = xr.Dataset(
-        {"uo": (dims, u, {"units": "m/s"}), "vo": (dims, v, {"units": "m/s"})},
-        {
-            "depth": ("depth", depth, {"units": "m", "positive": "down"}),
-            "lat": ("lat", lat, {"units": "degrees_north"}),
-            "lon": ("lon", lon, {"units": "degrees_east"}),
-        },
-    )
-    data.to_netcdf(name, engine="h5netcdf")
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from glider_stream.pilot.export import ANYWHERE, EXPORTS, export_path
 from glider_stream.pilot.slocum import goto_list, mission_files
 from glider_stream.pilot.slocum_files import goto_faults as lint
 from glider_stream.pilot.waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
+from glider_stream.search.path import FROZEN
 from glider_stream.water.frame import LocalFrame
 
 
@@ -204,3 +205,24 @@ def test_only_json_says_that_there_is_no_path(tmp_path, form):
 def test_a_goto_list_has_its_vehicles_name(tmp_path):
     with pytest.raises(InputError, match=r"goto_lNN\.ma.*route\.ma"):
         export_path(route(), tmp_path / "route.ma")
+
+
+def test_every_file_of_a_frozen_route_says_so(tmp_path):
+    still = replace(route(), departure=0.0, frozen=True)
+    forms = "a.json a.csv a.windows.csv a.geojson a.windows.geojson a.kml a.gpx targets"
+    for form in forms.split():
+        written = export_path(still, tmp_path / form)
+        told = [file.read_text(encoding="utf-8") for file in written]
+        if form == "a.json":
+            assert json.loads(told[0])["frozen"] is True
+        else:
+            assert all(FROZEN in text for text in told), form
+        if form.endswith("csv"):
+            rows = list(csv.DictReader(told[0].splitlines()))
+            assert {row["note"] for row in rows} == {FROZEN}
+        export_path(replace(still, frozen=False), tmp_path / form)
+        assert FROZEN not in (tmp_path / form).read_text(encoding="utf-8")
+    for file in export_path(still, tmp_path / "goto_l20.ma"):
+        assert FROZEN in file.read_text(encoding="ascii")
+        if file.name.startswith("goto"):
+            assert lint(file.read_text(encoding="ascii")) == []

@@ -125,6 +125,7 @@ def test_what_public_yo_files_may_say(old, new):
             "initial_wpt must be one number; got '-07300.0    3850.2'",
         ),
         ("wpt(enum) 0 ", "wpt(enum) 2 ", "initial_wpt is 2, and the last of 2 waypoints has the number 1"),
+        ("wpt(enum) 0 ", "wpt(enum) -2 ", "initial_wpt is -2, the closest: an ordered route begins at 0"),
         ("run(nodim) -2", "run(nodim) -3", "num_legs_to_run must be from -2; got -3"),
         ("dist(m) 500", "dist(m) 5", "list_when_wpt_dist must be from 10; got 5"),
         ("-7354.0000\t3918.0000", "7354.0000\t3918.0000", "km from the waypoint before it; look at its signs"),
@@ -137,6 +138,12 @@ def test_faults_of_goto_lists(old, new, said):
     assert old in LIST
     faults = goto_faults(LIST.replace(old, new, 1))
     assert any(said in fault for fault in faults), faults
+
+
+def test_a_list_that_is_flown_for_ever_may_begin_with_the_closest():
+    assert (
+        goto_faults(LIST.replace("wpt(enum) 0 ", "wpt(enum) -2 ").replace("run(nodim) -2", "run(nodim) -1")) == []
+    )
 
 
 def test_how_many_waypoints_a_list_may_hold_is_the_installations(tmp_path, capsys):

@@ -132,18 +132,18 @@ def test_thinning_keeps_what_no_glide_joins():
     path = route()
     none = Edge(int(Status.NO_HIT), *[math.nan] * 6)
     flown = []
-    thin(path, 1e9, lambda a, b: none, lambda hops: flown.extend(hops) or path)
+    thin(path, 1e9, lambda a, b, since: none, lambda hops: flown.extend(hops) or path)
     assert [hop[1].tolist() for hop in flown] == list(STOPS[1:])
     flown.clear()
     good = Edge(int(Status.CONNECTED), 10.0, 10.0, -0.4, 0.0, 0.4, 0.0)
     asked = []
-    thin(path, 1e9, lambda a, b: asked.append((a, b)) or good, lambda hops: flown.extend(hops) or path)
+    thin(path, 1e9, lambda a, b, since: asked.append((a, b)) or good, lambda hops: flown.extend(hops) or path)
     assert len(flown) == 1
     flown.clear()
-    thin(path, 50.0, lambda a, b: good, lambda hops: flown.extend(hops) or path)
+    thin(path, 50.0, lambda a, b, since: good, lambda hops: flown.extend(hops) or path)
     assert len(flown) == 3  # the stops lie far from the lines
     with pytest.raises(InputError, match="0 m or more"):
-        thin(path, -1.0, lambda a, b: good, lambda hops: path)
+        thin(path, -1.0, lambda a, b, since: good, lambda hops: path)
 
 
 # scoring

@@ -107,6 +107,11 @@ def test_properties_of_points_say_their_depth(tmp_path, told):
         ),
         ([("LineString", [[1, 2], [1, 3]], {"depth": 5})], "its line has a property 'depth', one for all"),
         ([("LineString", [[1, 2], [1, 3]], {"depth": [5, 6]})], "its line has a property 'depth'"),
+        (
+            [("Point", [1, 2], {"depth": "5 m"}), ("Point", [1, 3], {})],
+            "property 'depth' is '5 m', and not a number",
+        ),
+        ([("Point", [1, 2], {"dive": "5 m"}), ("Point", [1, 3], {})], "property 'dive' holds numbers"),
         ([("LineString", [[1, 2], [1, 3]], {"dive": 5})], "property 'dive' holds numbers"),
     ],
 )

@@ -103,12 +103,13 @@ def test_what_marks_were_added_to_our_own_file_are_no_stops(tmp_path):
     assert len(places) == len(STOPS)
 
 
-@pytest.mark.parametrize("value", ["200", "max"])
-def test_data_of_a_placemark_say_its_depth(tmp_path, value):
-    data = f'<ExtendedData><Data name="depth"><value>{value}</value></Data></ExtendedData>'
+def test_data_of_a_placemark_say_its_depth(tmp_path):
+    data = '<ExtendedData><Data name="depth"><value>200</value></Data></ExtendedData>'
     places = kml(tmp_path, mark("a", "18.4,38") + mark("b", "18.5,38.1", data=data)).places
-    assert places[1][2] == (200.0 if value == "200" else 0.0)
-    unknown = data.replace('"depth"', '"dive"').replace("max", "7")
+    assert places[1][2] == 200.0
+    with pytest.raises(InputError, match="its data 'depth' is '200 m', and not a number"):
+        kml(tmp_path, mark("a", "18.4,38") + mark("b", "18.5,38.1", data=data.replace("200", "200 m")))
+    unknown = data.replace('"depth"', '"dive"')
     with pytest.raises(InputError, match="its data 'dive' holds numbers"):
         kml(tmp_path, mark("a", "18.4,38") + mark("b", "18.5,38.1", data=unknown))
 

@@ -208,7 +208,7 @@ def test_the_first_leg_that_fails_is_named(file, tmp_path, capsys):
 @pytest.mark.parametrize("status", list(REASONS))
 def test_every_status_has_its_sentence(status):
     none = Edge(int(status), *6 * [float("nan")])
-    said = score([np.zeros(3), np.array([1.0, 2.0, -3.0])], lambda a, b: none, None, None)
+    said = score([np.zeros(3), np.array([1.0, 2.0, -3.0])], lambda a, b, since: none, None, None)
     assert str(said).startswith(f"leg 1 of 1 fails: {REASONS[status]} ({status.name.lower().replace('_', ' ')})")
     assert said.flown is None
 

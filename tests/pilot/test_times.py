@@ -63,6 +63,7 @@ def test_the_path_and_the_card(departs):
     lines = str(card(path, known)).splitlines()
     assert lines[len(path.legs) + 1].endswith(arrival)
     assert not any(line.endswith(" s") for line in lines)
+    assert card(path, known).as_dict()["departs"] == (None if departs is None else "2024-11-20T12:00:00+00:00")
 
 
 @pytest.mark.parametrize("departs", [None, DEPARTS])

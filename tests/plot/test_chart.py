@@ -15,7 +15,7 @@ from glider_stream.base.errors import InputError
 from glider_stream.kernels.terrain import OpenWater, Seabed
 from glider_stream.plot.fronts import front_times
 from glider_stream.plot.graticule import draw_graticule, named, round_degrees
-from glider_stream.plot.seabed import known_until, without_clearance
+from glider_stream.plot.seabed import without_clearance
 from glider_stream.plot.water import frame_of
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
@@ -73,19 +73,21 @@ def test_seabed_is_found_by_asking():
     bottom = terrain.bottom[i, j]
     assert (bottom >= 0).any()
     np.testing.assert_allclose(plot.sample_bottom(terrain, x, y), np.minimum(bottom, 0.0), atol=0.02)
-    known = plot.sample_bottom(terrain, x, y, known=-1000.0)
+    unknown = terrain._replace(ground=np.where(terrain.ground > -1000.0, terrain.ground, -np.inf))
+    known = plot.sample_bottom(unknown, x, y)
     np.testing.assert_array_equal(np.isfinite(known), bottom > -1000.0)
     assert np.isneginf(plot.sample_bottom(OpenWater(-np.inf), x, y)).all()
     np.testing.assert_allclose(plot.sample_bottom(OpenWater(-80.0), x, y), -80.0, atol=0.02)
     assert without_clearance(terrain).clearance == 0.0 < terrain.clearance
 
 
-def test_columns_that_end_with_the_levels_have_no_seabed():
-    flow, bottom = SimpleNamespace(levels=np.array([-500.0, 0.0])), np.array([[-550.0, -200.0]])
-    terrain = Seabed(bottom, 0.0, np.zeros((2, 2, 2)), 1.0, 1.0, 0.0, 0.0)
-    assert known_until(flow, terrain) == -550.0
-    assert known_until(flow, terrain._replace(bottom=bottom / 2)) == -math.inf
-    assert known_until(SimpleNamespace(), terrain) == known_until(flow, OpenWater(-9.0)) == -math.inf
+def test_a_figure_shows_the_seabed_and_not_what_is_closed():
+    """Clearance, keep-out and the end of the data close water; none of it is ground."""
+    ground, closed = np.array([[-np.inf, -200.0], [-90.0, 5.0]]), np.array([[-550.0, -150.0], [0.0, 0.0]])
+    corners = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], indexing="ij"), axis=-1)
+    terrain = Seabed(closed, 30.0, corners, 1.0, 1.0, 0.0, 0.0, ground)
+    x, y = np.meshgrid([0.0, 1.0], [0.0, 1.0], indexing="ij")
+    np.testing.assert_allclose(plot.sample_bottom(terrain, x, y), [[-np.inf, -200.0], [-90.0, 0.0]], atol=0.02)
 
 
 @pytest.mark.parametrize("start", [None, (13.0, 20.0, -30.0)])
@@ -174,7 +176,8 @@ def test_names_and_steps_of_degrees():
 
 def test_a_profile_shows_the_seabed_where_it_is_near():
     scene = ocean_scene()
-    shallow = scene.terrain._replace(bottom=np.minimum(scene.terrain.bottom, 0.0) * 0.5 - 1.0, clearance=0.0)
+    raised = np.minimum(scene.terrain.ground, 0.0) * 0.5 - 1.0
+    shallow = scene.terrain._replace(bottom=raised, ground=raised, clearance=0.0)
     for terrain, said, ground in ((scene.terrain, "1,4", False), (shallow, "over the seabed", True)):
         figure = plot.plot_chart(scene.flow, terrain, scene.problem, plot.placed(scene.path, scene.problem))
         (ax,) = (ax for ax in figure.findobj(lambda a: hasattr(a, "get_xlabel")) if "(b)" in ax.get_title("left"))

@@ -334,7 +334,8 @@ def seabed(bottom):
     """A bottom over [-300, 300]^2 in cells of 30 m around its grid points."""
     ends = np.stack(np.meshgrid([0.0, 20.0], [0.0, 20.0], indexing="ij"), axis=-1)
     x, y = np.meshgrid(np.linspace(-300, 300, 21), np.linspace(-300, 300, 21), indexing="ij")
-    return Seabed(bottom(x, y) + np.zeros((21, 21)), 5.0, ends, 1 / 600, 1 / 600, -300.0, -300.0)
+    height = bottom(x, y) + np.zeros((21, 21))
+    return Seabed(height, 5.0, ends, 1 / 600, 1 / 600, -300.0, -300.0, height)
 
 
 def test_land_and_seabed_block(evaluator, vortices):

@@ -9,9 +9,10 @@ from helpers.small import command, roadmap, scenario_file, strict_json
 
 from glider_stream.base.errors import InputError
 from glider_stream.scenario import read_scenario
+from glider_stream.search.layered import SurfacingPlanner
 from glider_stream.search.path import SURFACE
 from glider_stream.search.query import Planner
-from glider_stream.search.surfacing import BINS, Surfacing, SurfacingPlanner
+from glider_stream.search.surfacing import BINS, LEAST_HOURS, Surfacing
 
 
 def keeps(rule, legs, slack=0.0):
@@ -96,6 +97,21 @@ def test_a_rule_that_is_none(tmp_path):
     problem = read_scenario(scenario_file(tmp_path)).problem()
     loose = SurfacingPlanner(road, problem, Surfacing(50)).query()
     assert loose.travel_time == Planner(road, problem).query().travel_time
-    for wrong in ({"most_yos": 0}, {"most_hours": 0.0}, {"most_hours": float("nan")}):
+    hours = [{"most_hours": value} for value in (0.0, -1.0, 1e-300, 5e-324, 1e300, float("nan"), float("inf"))]
+    for wrong in ({"most_yos": 0}, {"most_yos": 101}, *hours):
         with pytest.raises(InputError, match="`most_"):
             Surfacing(**wrong)
+
+
+def test_the_least_hours_are_kept(capsys, tmp_path, monkeypatch):
+    """A leg that is longer by any factor is no leg of a route with that rule."""
+    rule = Surfacing(most_hours=LEAST_HOURS)
+    time = np.array([1.0, 3.6, 4.0, 1e9, 1e300])
+    assert (rule.steps(0, np.zeros(5), time)[1] <= BINS).tolist() == [True, True, False, False, False]
+    problem = read_scenario(scenario_file(tmp_path)).problem()
+    assert not SurfacingPlanner(roadmap(), problem, rule).query().found
+    monkeypatch.chdir(tmp_path)
+    for key in ("1e-300", "1e300"):
+        said = command(capsys, "build", "small.toml", "-o", "x.h5", "--set", f"query.most_hours={key}")
+        query = command(capsys, "query", "x.h5") if said.code == 0 else said
+        assert (query.code, "`most_hours` must be from 0.001 to 277,778 h" in query.err) == (2, True)

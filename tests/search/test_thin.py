@@ -17,9 +17,10 @@ from glider_stream.kernels.edges import Edge, Status
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
 from glider_stream.search.answer import with_fewer_legs
+from glider_stream.search.layered import SurfacingPlanner
 from glider_stream.search.path import hops_of
 from glider_stream.search.query import Planner
-from glider_stream.search.surfacing import Surfacing, SurfacingPlanner
+from glider_stream.search.surfacing import Surfacing
 from glider_stream.search.thin import thin
 
 GOOD = Edge(int(Status.CONNECTED), 10.0, 10.0, -0.4, 0.0, 0.4, 0.0)
@@ -70,14 +71,15 @@ def test_a_route_longer_than_the_stack_is_deep():
     stops = [[10.0 * n, float(n % 7) ** 2, -1.0 - n % 5] for n in range(3000)]
     path, flights = route(stops=stops), []
     none = GOOD._replace(status=int(Status.NO_HIT))
-    thin(path, 1e9, lambda a, b: none, lambda hops: flights.append(hops) or path)
+    thin(path, 1e9, lambda a, b, since: none, lambda hops: flights.append(hops) or path)
     assert [hop[1].tolist() for hop in flights[0]] == stops[1:]
 
 
 def test_what_must_stay_stays():
     stops = [[0.0, 0.0, 0.0], [900.0, 0.0, -50.0], [1800.0, 0.0, -1.0], [2700.0, 0.0, -50.0], [3600.0, 0.0, -2.0]]
     path, flights = route(stops=stops), []
-    thin(path, 1e3, lambda a, b: GOOD, lambda hops: flights.append(hops) or path, lambda stop: stop[2] > -10)
+    fly, up = (lambda hops: flights.append(hops) or path), (lambda stop: stop[2] > -10)
+    thin(path, 1e3, lambda a, b, since: GOOD, fly, up)
     assert [hop[1].tolist() for hop in flights[0]] == [stops[2], stops[4]]
 
 
@@ -95,14 +97,14 @@ def test_a_rule_of_surfacing_survives(search):
     )
     assert Surfacing(2).holds(up_and_down)
     assert not Surfacing(1).holds(up_and_down)
-    slow = SimpleNamespace(connect=lambda a, b: GOOD, rule=rule)
+    slow = SimpleNamespace(connect=lambda a, b, since: GOOD, rule=rule)
     late = replace(path, legs=tuple(replace(leg, duration=3600.0) for leg in path.legs))
     keeper = SurfacingPlanner(roadmap(), search.problem, slow.rule)
     keeper.fly = lambda hops: late
     kept = with_fewer_legs(path, 1e4, keeper, None)
     assert kept.legs == path.legs
     dear = replace(path, cost=1e9)
-    free = SimpleNamespace(connect=lambda a, b: GOOD, fly=lambda hops: dear)
+    free = SimpleNamespace(connect=lambda a, b, since: GOOD, fly=lambda hops: dear, rule=Surfacing())
     assert with_fewer_legs(path, 1e4, free, 10.0).cost == path.cost
     assert with_fewer_legs(path, 1e4, free, None).cost == 1e9
 

@@ -13,8 +13,9 @@ from glider_stream.kernels.edges import Status
 from glider_stream.roadmap.problem import Problem
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
+from glider_stream.search.layered import SurfacingPlanner
 from glider_stream.search.query import Planner
-from glider_stream.search.surfacing import Surfacing, SurfacingPlanner
+from glider_stream.search.surfacing import Surfacing
 from glider_stream.search.why_not import Looked, no_edges, outrun, why_not
 from glider_stream.water.analytic import Uniform
 
@@ -106,7 +107,7 @@ def test_nodes_too_far_apart(tmp_path):
     polar = problem.evaluator.polar
     fastest = max(speed[-1] * math.sin(angle) for speed, angle in zip(polar.speed, polar.steepest, strict=True))
     assert told["reach_m"]["down"] == pytest.approx(10 * fastest)
-    across = 10 * (polar.best_horizontal.max() + problem.evaluator.flow.max_speed)
+    across = 10 * (polar.best_horizontal.max() + problem.evaluator.flow.extent.max_speed)
     assert told["reach_m"]["across"] == pytest.approx(across)
     assert told["legs_onward"]["statuses"] == {"too_far": told["legs_onward"]["looked_at"]}
     assert "100% too far or too deep" in path.why

@@ -22,7 +22,7 @@ from glider_stream.water.ocean import (
     read_currents,
     sample,
 )
-from glider_stream.water.ocean.flow import bottoms, filled, lower_faces, slots
+from glider_stream.water.ocean.flow import closed_below, data_end, filled, slots
 from glider_stream.water.ocean.grid import MAP_ERROR, LonLatGrid, index_map
 
 xr = pytest.importorskip("xarray")
@@ -452,7 +452,7 @@ def test_the_flow_of_a_domain(tmp_path):
         assert allowed(seabed, x, y, -depth)
     x, y = (float(part) for part in FRAME.to_local(20.1, 60.4))
     assert not contains(flow, x, y, 0.0)
-    # the last level's cell reaches as far down as up: 200 + 60 m
+    # data hold half a level's spacing beyond the last one: 200 + 60 m
     assert allowed(seabed, 0.0, 0.0, -259.9)
     assert not allowed(seabed, 0.0, 0.0, -260.1)
 
@@ -540,11 +540,15 @@ def test_dry_cells_take_from_wet_neighbours_then_from_above():
     assert (filled(values)[1, 3:] == 0.5).all()
 
 
-def test_bottoms_are_cell_faces():
-    faces = lower_faces(np.array([1.0, 3.0, 9.0]))
-    assert faces.tolist() == [2.0, 6.0, 12.0]
-    wet = np.array([[1, 1, 1, 0], [0, 1, 1, 0], [0, 0, 1, 1]], dtype=bool)
-    assert bottoms(wet, faces).tolist() == [-2.0, -6.0, -12.0, 0.0]
+def test_columns_are_closed_where_their_data_end():
+    depth, unknown = np.array([1.0, 3.0, 9.0]), np.full(5, np.inf)
+    assert data_end(depth) == 12.0
+    wet = np.array([[1, 1, 1, 0, 1], [0, 1, 1, 0, 0], [0, 0, 1, 1, 0]], dtype=bool)
+    # the deepest level with data, half a level beyond the last, and nothing where the top level is dry
+    assert closed_below(wet, depth, depth, unknown) == pytest.approx([-1.01, -3.01, -12.0, 0.0, -1.01])
+    # where the seabed lies above the next level, the data go on to it
+    seabed = np.array([2.5, 8.9, np.inf, np.inf, 1.0])
+    assert closed_below(wet, depth, depth, seabed) == pytest.approx([-np.inf, -np.inf, -12.0, 0.0, -np.inf])
 
 
 def test_grid_flow_from_arrays():
@@ -620,6 +624,12 @@ def test_describe_says_what_was_taken_and_read(tmp_path):
         describe(path, at=[(*PLACE[:3], None)])
 
 
+def file_words(path):
+    """What `describe` says was assumed, as a roadmap keeps it."""
+    took = describe(path).as_dict()["took"]
+    return {f"{key}: {took[key]}" for key in ("bottom", "land", "levels", "stamps")}
+
+
 def test_the_scenario_block(tmp_path):
     path = written(tmp_path, dataset())
     flow, bottom, words = OceanFlow((str(path),), epoch=str(START)).waters(FRAME, *DOMAIN)
@@ -627,7 +637,9 @@ def test_the_scenario_block(tmp_path):
     assert x == pytest.approx(current(FRAME.lon, FRAME.lat, 47.0, 15.0), abs=TOLERANCE)
     assert bottom.height.shape == bottom.grid.shape
     assert (bottom.height == -260.0).all()
+    assert np.isneginf(bottom.ground).all()
     assert "currents.nc" in words
+    assert file_words(path) <= set(words.split("; "))
 
 
 @real

@@ -271,7 +271,7 @@ def test_no_leg_touches_what_the_files_close(tmp_path, monkeypatch):
 def test_a_scenario_speaks_of_its_terrain(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written(tmp_path, chart())
-    zones(tmp_path, square(12.6, 55.8))
+    zones(tmp_path, square(12.55, 55.8))
     Path("sound.toml").write_text(SCENARIO)
     small = ("--set", "sampling.count=40", "--set", "neighbours.k=5")
     said = command(capsys, "build", "sound.toml", "-o", "road.h5", *small)

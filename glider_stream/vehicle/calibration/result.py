@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
+from ...base.terminal import plain
 from ...base.toml import to_toml
 from ..models import MODELS, Glider
 from .dives import Dives
@@ -71,11 +72,11 @@ class Calibration:
         }
 
     def __str__(self) -> str:
-        took = ", ".join(f"{what} = {column}" for what, column in self.dives.took.items())
+        took = ", ".join(f"{what} = {plain(column)}" for what, column in self.dives.took.items())
         phases = "" if self.dives.down is not None else "; phases are not told, so a climb mirrors a dive"
         lines = [f"{self.dives.vertical.size} dives, {took}{phases}"]
         if self.dives.unused:
-            lines.append(_line("not used", ", ".join(self.dives.unused)))
+            lines.append(_line("not used", ", ".join(map(plain, self.dives.unused))))
         lines.append(_line("fit", "plain least squares; +- is one standard error, what is held taken for right"))
         for name, one in self.parameters.items():
             value = f"{one.value:.5g} +- {one.error:.2g} {one.unit}".rstrip()

@@ -5,36 +5,60 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Array
+from ...base.arrays import Array, Index
 from ...base.errors import InputError
 from ...base.settings import require
 from ..frame import wrapped
-from .names import WORDS, Names, standard_name
+from .grid import gaps
+from .names import WORDS, Names, standard_name, units_of
 from .units import in_metres
 
 MOST_POINTS = 100_000_000
 """Places of a curved grid that are looked at."""
 
 
-def degrees(name: str, variable: Any, kind: str) -> tuple[Array, bool]:
-    """The axis rising, without a last point that repeats the first, and whether it was turned."""
+def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
+    """The axis rising, each longitude once, and which values of the file it is made of."""
     broken = f"the {WORDS[kind]} `{variable.name}` in {name}"
     require(variable.size <= MOST_POINTS, f"{broken} claims {variable.size:,} points; cut the file")
     axis = np.asarray(variable.values, dtype=np.float64).ravel()
     require(bool(np.isfinite(axis).all()), f"{broken} has missing values")
+    order = np.arange(axis.size)
     if str(variable.attrs.get("units", "")).strip().lower() in ("radian", "radians", "rad"):
         axis = np.degrees(axis)
-    turned = axis.size > 1 and bool(np.median(np.diff(axis)) < 0)
-    axis = axis[::-1] if turned else axis
+    if axis.size > 1 and bool(np.median(np.diff(axis)) < 0):
+        axis, order = axis[::-1], order[::-1]
     if kind == "lon":
-        axis = axis[0] + (axis - axis[0]) % 360
-        # a cyclic point rounds to either side of the full circle
-        cyclic = axis.size > 2 and bool(axis[-1] < axis[1] - 1e-3 * abs(axis[1] - axis[0]))
-        axis = axis[:-1] if cyclic else axis
+        axis, order = _once_around(axis, order)
     else:
         require(bool((np.abs(axis) <= 90.001).all()), f"{broken} reaches beyond 90 degrees")
     require(bool((np.diff(axis) > 0).all()), f"{broken} does not rise or fall steadily")
-    return axis, turned
+    return axis, order
+
+
+def _once_around(axis: Array, order: Index) -> tuple[Array, Index]:
+    """Longitudes that rise from the first, without those that repeat the first; the widest gap is the seam."""
+    if axis.size < 3:
+        return axis[0] + (axis - axis[0]) % 360, order
+    # a raw axis that rises throughout may span more than the circle; any other is read modulo 360
+    rises = bool((np.diff(axis) > 0).all())
+    axis = axis if rises else axis[0] + (axis - axis[0]) % 360
+    # a cyclic point rounds to either side of the full circle
+    slack = 1e-3 * abs(axis[1] - axis[0])
+    before = np.concatenate([[-np.inf], np.maximum.accumulate(axis)[:-1]])
+    kept = (axis > before) & (axis < axis[0] + 360 - slack)
+    away = np.abs((axis[~kept][:, None] - axis[kept] + 180) % 360 - 180).min(axis=1, initial=360.0)
+    if (away > 0.01 * abs(axis[1] - axis[0])).any():
+        # values that repeat no other: the caller sees that the axis does not rise
+        return axis, order
+    axis, order = axis[kept], order[kept]
+    steps = np.diff(axis)
+    widest = int(steps.argmax()) if steps.size else 0
+    if gaps(axis).any() and steps[widest] > axis[0] + 360 - axis[-1]:
+        # a part about the date line that was sorted from -180 to 180
+        order = np.roll(order, -(widest + 1))
+        axis = np.concatenate([axis[widest + 1 :], axis[: widest + 1] + 360])
+    return axis, order
 
 
 def places(name: str, lon: Any, lat: Any) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -81,12 +105,12 @@ def _continued(values: Array) -> Array:
     return values
 
 
-def depths(name: str, variable: Any, said: Names) -> tuple[Array, bool, str]:
-    """Depths downward, rising; whether turned; what was taken for what."""
+def depths(name: str, variable: Any, said: Names) -> tuple[Array, Index, float, str]:
+    """Depths downward, rising; which values of the file they are; metres of its unit; what was taken for what."""
     axis = np.atleast_1d(np.asarray(variable.values, dtype=np.float64)).ravel()
     broken = f"the depth `{variable.name}` in {name}"
     require(bool(np.isfinite(axis).all()), f"{broken} has missing values")
-    units = str(variable.attrs.get("units", "")).strip().lower()
+    units = units_of(variable).lower()
     factor = in_metres(units)
     if factor is None:
         raise InputError(f"{broken} is in {units!r}, not in metres: convert it first")
@@ -105,42 +129,8 @@ def depths(name: str, variable: Any, said: Names) -> tuple[Array, bool, str]:
         f"{broken} is said to be positive {claim}, but runs from {axis[0]:g} to {axis[-1]:g}: "
         f'if these are depths under the surface, name `positive` = "{sense}" in `names`',
     )
-    axis = np.abs(axis) * factor
-    turned = axis.size > 1 and bool(axis[0] > axis[-1])
-    axis = axis[::-1] if turned else axis
+    axis, order = np.abs(axis) * factor, np.arange(axis.size)
+    if axis.size > 1 and bool(axis[0] > axis[-1]):
+        axis, order = axis[::-1], order[::-1]
     require(bool((np.diff(axis) > 0).all()), f"{broken} does not rise or fall steadily")
-    return axis, turned, f"{variable.name}, positive {sense}"
-
-
-def times(name: str, data: Any, of: str) -> tuple[NDArray[np.datetime64] | None, tuple[str, ...]]:
-    """UTC, or None for a single time that does not say when; notes."""
-    import xarray
-
-    variable = data[of]
-    broken = f"the time `{of}` in {name}"
-    if " since " not in str(variable.attrs.get("units", "")):
-        require(
-            variable.size == 1,
-            f'{broken} has no unit such as "hours since 1950-01-01", so {variable.size} times are unknown',
-        )
-        return None, (f"`{of}` does not say when it is",)
-    require(bool(np.isfinite(variable.values).all()), f"{broken} has missing values")
-    try:
-        values = np.atleast_1d(xarray.decode_cf(data[[of]].drop_encoding())[of].values).ravel()
-    except Exception as error:
-        # what an impossible unit makes the libraries raise is not written down anywhere
-        raise InputError(
-            f"{broken} cannot be read: units {variable.attrs.get('units')!r}, calendar "
-            f"{variable.attrs.get('calendar', 'standard')!r} ({str(error).splitlines()[0]})"
-        ) from None
-    notes: tuple[str, ...] = ()
-    if values.dtype.kind == "O":
-        calendar = str(variable.attrs.get("calendar", "standard"))
-        try:
-            # by its label: 1 March stays 1 March, whatever February was
-            values = np.array([np.datetime64(one.isoformat(), "us") for one in values])
-        except ValueError:
-            raise InputError(f"{broken} has dates of the calendar {calendar!r} that do not exist") from None
-        notes = (f"times of the calendar {calendar!r} keep their dates",)
-    rounded = (values.astype("datetime64[us]") + np.timedelta64(500, "us")).astype("datetime64[ms]")
-    return rounded, notes
+    return axis, order, factor, f"{variable.name}, positive {sense}"

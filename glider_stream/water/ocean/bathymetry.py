@@ -2,12 +2,13 @@
 
 import math
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...base.arrays import Array, Index
 from ...base.checks import Range
 from ...base.errors import InputError
 from ...base.settings import require
@@ -16,8 +17,9 @@ from .axes import degrees, places
 from .bottom import Bottom
 from .grid import Grid, grid_of
 from .horizontal import horizontal_of
-from .names import Catalogue, Names, listing, standard_name
+from .names import Catalogue, Names, listing, standard_name, units_of
 from .opening import opened
+from .sentinel import undeclared
 from .units import in_metres
 
 UP_NAMES = re.compile(
@@ -27,11 +29,29 @@ UP_NAMES = re.compile(
 DOWN_NAMES = re.compile(r"sea_floor_depth|^sea_floor_depth_below|depth_below_(geoid|sea_surface|mean_sea_level)")
 UP_SHORT = {"elevation", "topo", "z", "altitude", "band1", "height", "elev", "bedrock", "rose"}
 DOWN_SHORT = {"deptho", "h", "bathymetry", "bathy", "depth", "bathy_metry", "ht", "hu", "bottom_depth", "topog"}
-BEYOND = 12_000.0
-"""No land is as high and no sea as deep [m]: a fill."""
+HEIGHT_WORDS = re.compile(r"\b(elevation|height|altitude|topography)\b")
+"""Long names of what counts upward."""
 LIMIT = 500_000_000
 """The most that the heights of a domain may take in memory [bytes]."""
 MARGIN = 3
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What the user says of a bathymetry: its `variable`, whether it counts "up" or "down", and other `names`."""
+
+    variable: str | None = None
+    positive: str | None = None
+    names: Names = field(default_factory=Names)
+
+    def __post_init__(self) -> None:
+        known = self.positive in (None, "up", "down")
+        require(known, f'`positive` must be "up" or "down"; got {self.positive!r}')
+        fits = {"lon", "lat", "units", "positive", "group"}
+        alien = [key for key, value in vars(self.names).items() if value is not None and key not in fits]
+        require(
+            not alien, f"`terrain.names` knows {', '.join(sorted(fits))}; got {', '.join(alien)}: leave it out"
+        )
 
 
 def read_bathymetry(
@@ -42,16 +62,23 @@ def read_bathymetry(
     beyond: float = 0.0,
     variable: str | None = None,
     positive: str | None = None,
+    names: Names | None = None,
 ) -> Bottom:
     """The bottom in a domain [degrees], and as far `beyond` it [m] as the file goes.
 
-    InputError where it does not hold the domain. `variable` and `positive` ("up", "down") where the file does
-    not speak for itself. No data is land.
+    InputError where it does not hold the domain. `variable`, `positive` ("up", "down") and `names` (lon, lat,
+    units, group) where the file does not speak for itself. No data is land.
     """
-    path = Path(file)
-    require(positive in (None, "up", "down"), f'`positive` must be "up" or "down"; got {positive!r}')
-    with opened(path) as data:
-        return _read(path.name, data, frame, lon, lat, beyond, variable, positive)
+    path, said = Path(file), names or Names()
+    asked = Chart(variable, positive or said.positive, said)
+    with opened(path, said.group) as data:
+        for key, name in said.variables().items():
+            require(
+                name in data.variables,
+                f"{path.name} holds no variable `{name}`, which `{key}` names; "
+                f"it holds: {listing(data.variables)}",
+            )
+        return _read(path.name, data, frame, lon, lat, beyond, asked)
 
 
 def _pick(name: str, data: Any, variable: str | None) -> Any:
@@ -93,6 +120,18 @@ def _sense(name: str, one: Any, values: Array, positive: str | None) -> str:
         raise InputError(
             f'`{one.name}` in {name} is a depth, yet never above 0: name `positive` = "up" if it counts upward'
         )
+    told = standard_name(one) or str(one.attrs.get("positive", ""))
+    long = str(one.attrs.get("long_name", "")).lower()
+    if positive is None and said == "down" and not told and (below or HEIGHT_WORDS.search(long)):
+        raise InputError(
+            f"`{one.name}` in {name} may be a depth or a height: by its name it counts down, yet "
+            + (
+                f"its long name is {long!r}"
+                if HEIGHT_WORDS.search(long)
+                else f"it runs from {values.min():g} to {values.max():g}"
+            )
+            + ': name `positive`, "up" or "down"'
+        )
     if positive is None and said == "up" and not below:
         raise InputError(
             f"`{one.name}` in {name} is a height, yet nowhere below 0, so there is no sea: name `positive` = "
@@ -101,44 +140,45 @@ def _sense(name: str, one: Any, values: Array, positive: str | None) -> str:
     return said
 
 
-def _read(
-    name: str,
-    data: Any,
-    frame: LocalFrame,
-    lon: Range,
-    lat: Range,
-    beyond: float,
-    variable: str | None,
-    positive: str | None,
-) -> Bottom:
-    one = _pick(name, data, variable)
-    catalogue = Catalogue(name, data, Names())
-    rows, lon_of, lat_of = horizontal_of(catalogue, one, "u")
-    single = {dim: 0 for dim in map(str, one.dims) if dim not in rows}
+def _places(name: str, data: Any, one: Any, said: Names) -> tuple[tuple[str, str], Grid, Index, Index]:
+    """The dimensions across and along the rows, the grid, and which rows and columns of the file it has."""
+    dims, lon, lat = horizontal_of(Catalogue(name, data, said), one, "u")
+    if lon.ndim == 1:
+        (at_lon, columns), (at_lat, rows) = degrees(name, lon, "lon"), degrees(name, lat, "lat")
+        require(min(at_lon.size, at_lat.size) > 1, f"`{one.name}` in {name} is no grid of two points or more")
+        return dims, grid_of(at_lon, at_lat), rows, columns
+    grid = grid_of(*places(name, lon, lat)[:2])
+    return dims, grid, np.arange(grid.shape[0]), np.arange(grid.shape[1])
+
+
+def _read(name: str, data: Any, frame: LocalFrame, lon: Range, lat: Range, beyond: float, asked: Chart) -> Bottom:
+    one = _pick(name, data, asked.variable)
+    dims, grid, rows, columns = _places(name, data, one, asked.names)
+    single = {dim: 0 for dim in map(str, one.dims) if dim not in dims}
     require(
         all(one.sizes[dim] == 1 for dim in single),
         f"`{one.name}` in {name} has dimensions {', '.join(map(str, one.dims))}: a bathymetry has two",
     )
-    units = str(one.attrs.get("units", ""))
+    units = asked.names.units or units_of(one)
     factor = in_metres(units)
     if factor is None:
-        raise InputError(f"`{one.name}` in {name} is in {units!r}, not in metres: convert it first")
-    if lon_of.ndim == 1:
-        (at_lon, lon_turned), (at_lat, lat_turned) = degrees(name, lon_of, "lon"), degrees(name, lat_of, "lat")
-        require(min(at_lon.size, at_lat.size) > 1, f"`{one.name}` in {name} is no grid of two points or more")
-        grid: Grid = grid_of(at_lon, at_lat)
-    else:
-        lon_turned = lat_turned = False
-        grid = grid_of(*places(name, lon_of, lat_of)[:2])
+        raise InputError(
+            f"`{one.name}` in {name} is in {units!r}, not in metres: convert it, or name `units` in `names`"
+        )
     cell = min(float(size.min()) for size in grid.cell_sizes())
     cut = grid.cut(name, lon, lat, frame.lon, MARGIN + math.ceil(max(beyond, 0.0) / max(cell, 1.0)))
-    ny, nx = (one.sizes[dim] for dim in rows)
     size = 8 * cut.grid.shape[0] * cut.grid.shape[1]
     require(size <= LIMIT, f"the bottom of {name} would take {size / 1e9:.1f} GB: narrow the domain")
-    j, i = np.arange(ny)[cut.rows], cut.columns
-    picked = {rows[0]: ny - 1 - j if lat_turned else j, rows[1]: nx - 1 - i if lon_turned else i, **single}
-    values = np.asarray(one.isel(picked).transpose(*rows).values, np.float64) * factor
-    values = np.where(np.abs(values) < BEYOND, values, np.nan)
-    said = _sense(name, one, values[np.isfinite(values)], positive)
+    picked = {dims[0]: rows[cut.rows], dims[1]: columns[cut.columns], **single}
+    values = np.asarray(one.isel(picked).transpose(*dims).values, np.float64) * factor
+    gone, marks = undeclared(values)
+    values = np.where(gone, np.nan, values)
+    said = _sense(name, one, values[np.isfinite(values)], asked.positive)
     height = np.nan_to_num(-values if said == "down" else values, nan=0.0)
-    return Bottom(cut.grid, height, True, f"{one.name} of {name}, positive {said}")
+    words = f"{one.name} of {name}, positive {said}"
+    if marks:
+        told = ", ".join(f"{mark / factor:g}" for mark in marks)
+        words += f", where {told} ({int(gone.sum())} points) is taken as no data"
+    if (without := int(np.isnan(values).sum())) > 0:
+        words += f", {without} points without data taken as land"
+    return Bottom(cut.grid, height, True, words)

@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Array, Bools
 from ...base.errors import InputError
+from ...base.settings import require
 from .grid import Grid
 
 Times = NDArray[np.datetime64]
+YEARS = 1000, 8999
+"""What a scenario counts from its epoch stays within the calendar that Python has, years 1 to 9999."""
 
 
 @dataclass(frozen=True)
@@ -18,8 +21,10 @@ class OceanFile:
     """Currents as a file holds them: `u` east, `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data.
 
     `grid` (ny, nx); `depth` (nz) rises downward [m]; `times` (nt) UTC, or None if unknown; `wet` (nz, ny, nx)
-    where there is data at every time. `surface`: the file names no depth, `depth` is [0]. `seabed` (ny, nx)
-    [m, downward] where the model says it. `took` says what was taken for what; `notes` what else to know.
+    where there is data at every time. `surface`: the file names no depth, or its one level is held at all;
+    `depth` is [0]. `lower` (nz) [m]: how deep the value of each level holds; `top` [m]: how shallow the first.
+    `seabed` (ny, nx) [m, downward]: of the model's own depth or of the deepest level with data, inf where the
+    data go on to the last level. `took` says what was taken for what, `notes` what else to know.
     """
 
     name: str
@@ -31,8 +36,17 @@ class OceanFile:
     wet: Bools
     surface: bool
     took: dict[str, str]
-    notes: tuple[str, ...] = ()
-    seabed: Array | None = None
+    notes: tuple[str, ...]
+    seabed: Array
+    lower: Array
+    top: float
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What was assumed of bottom, land, levels and times, for a roadmap to keep."""
+        return tuple(
+            f"{key}: {self.took[key]}" for key in ("bottom", "land", "levels", "stamps") if key in self.took
+        )
 
     @property
     def steady(self) -> bool:
@@ -53,6 +67,9 @@ def parse_time(text: str, what: str) -> np.datetime64:
         when = datetime.fromisoformat(text.strip())
     except (ValueError, AttributeError):
         raise InputError(f"{what} must be a time such as 2024-11-20T12:00:00; got {text!r}") from None
+    first, last = YEARS
+    fits = first <= when.year <= last
+    require(fits, f"{what} must lie in the years {first} to {last}; got {text!r}")
     if when.tzinfo is not None:
         when = when.astimezone(UTC).replace(tzinfo=None)
     return np.datetime64(when, "ms")

@@ -14,8 +14,9 @@ from ...kernels.flow import Extent, OceanGrid, velocities
 from ...kernels.terrain import Seabed, allowed
 from ..frame import MAX_SCALE_ERROR, LocalFrame
 from .bottom import Bottom
-from .file import OceanFile, parse_time
-from .grid import EVEN, Grid, IndexMap, index_map, span
+from .file import OceanFile, Times, parse_time
+from .grid import EVEN, Grid, IndexMap, gaps, index_map, span, unbroken
+from .levels import no_such_levels
 
 MARGIN = 2
 """Cells kept around a domain: paths may stray."""
@@ -25,14 +26,16 @@ DEPTH_SLACK = 0.01
 """The deepest level holds for depths this far [m] beyond it: they come rounded."""
 
 
-def levels_for(name: str, axis: Array | None, depth: Range) -> slice:
-    """The levels that a domain's depths [m] need, the first where there is no axis; InputError if too shallow."""
+def levels_for(name: str, axis: Array | None, depth: Range, top: float = 0.0) -> slice:
+    """The levels that a domain's depths [m] need, the first where there is no axis.
+
+    InputError where it is deeper than the last, or begins above `top`, how shallow [m] the first holds.
+    """
     if axis is None:
         return slice(0, 1)
-    require(
-        depth[1] <= axis[-1] + DEPTH_SLACK,
-        f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} is at {axis[-1]:g} m",
-    )
+    refusal = no_such_levels(name, axis, depth, top)
+    if refusal is not None:
+        raise refusal
     if axis.size == 1:
         return slice(0, 1)
     needed = span(axis, depth, 0)
@@ -72,18 +75,21 @@ def filled(values: Array) -> Array:
     return np.nan_to_num(values)
 
 
-def lower_faces(depth: Array) -> Array:
-    """Depth [m] of each level's lower face: midway to the next; the last as far again as its upper one."""
-    if depth.size == 1:
-        return np.maximum(2 * depth, 1.0)
-    middle = (depth[1:] + depth[:-1]) / 2
-    return np.append(middle, 2 * depth[-1] - middle[-1])
+def data_end(depth: Array) -> float:
+    """How deep [m] the last of some levels holds where its column has data to the last: half a level further."""
+    return max(2 * float(depth[0]), 1.0) if depth.size == 1 else float(depth[-1] + (depth[-1] - depth[-2]) / 2)
 
 
-def bottoms(wet: Bools, faces: Array) -> Array:
-    """Height [m] of the bottom under each column of `wet` (nz, ...): 0 where the top level is dry."""
-    deep = np.cumprod(wet, axis=0).sum(axis=0)
-    return np.where(deep > 0, -faces[deep - 1], 0.0)
+def closed_below(wet: Bools, depth: Array, lower: Array, seabed: Array) -> Array:
+    """Height [m] below which columns of `wet` (nz, ...) levels have no data: 0 where the top level is dry.
+
+    -inf where the data go on to the `seabed` [m, downward]. `lower` [m]: how deep each level holds.
+    """
+    count = np.cumprod(wet, axis=0).sum(axis=0)
+    following = np.append(depth, np.inf)[count]
+    last = np.append(lower[:-1], max(float(lower[-1]), data_end(depth)))[np.maximum(count, 1) - 1]
+    to_seabed = (count < len(wet)) & (following > seabed)
+    return np.where(count == 0, 0.0, np.where(to_seabed, -np.inf, -(last + DEPTH_SLACK * (count < len(wet)))))
 
 
 def _assemble(
@@ -91,11 +97,15 @@ def _assemble(
     levels: Array,
     times: Array | None,
     at: IndexMap,
-    bottom: Array,
+    ground: Array,
+    closed: Array,
     spacing: float,
     clearance: float,
 ) -> tuple[OceanGrid, Seabed]:
-    """Values (times, levels, ni, nj, 2) without NaN, levels rising; a single level or time is doubled."""
+    """Values (times, levels, ni, nj, 2) without NaN, levels rising; a single level or time is doubled.
+
+    `ground` (ni, nj): height of the seabed [m], -inf where it is not known; `closed`: below that no data.
+    """
     span = (-np.inf, np.inf) if times is None else (float(times[0]), float(times[-1]))
     if times is None:
         times, values = np.array([0.0, 1.0]), np.repeat(values, 2, axis=0)
@@ -122,8 +132,8 @@ def _assemble(
             length_scale=spacing,
         ),
     )
-    seabed = Seabed(np.ascontiguousarray(bottom), clearance, at.index_map, at.per_x, at.per_y, at.x_lo, at.y_lo)
-    return flow, seabed
+    bottom, ground = (np.ascontiguousarray(part) for part in (np.maximum(ground, closed), ground))
+    return flow, Seabed(bottom, clearance, at.index_map, at.per_x, at.per_y, at.x_lo, at.y_lo, ground)
 
 
 def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice, Array | None]:
@@ -141,8 +151,24 @@ def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice,
     within = bool(file.times[0] <= epoch <= file.times[-1])
     require(within, f"{when} lies outside the times of {file.name}, {file.time_range}")
     seconds = (file.times - epoch) / np.timedelta64(1, "s")
-    first = min(int(np.searchsorted(seconds, 0, side="right")) - 1, seconds.size - 2)
-    return slice(first, seconds.size), seconds[first:]
+    run, gap = unbroken_times(file.times, epoch)
+    require(
+        bool(seconds[run.start] <= 0 <= seconds[run.stop - 1]) and run.stop - run.start > 1,
+        f"{when} lies in a gap of {file.name}: {gap}",
+    )
+    first = min(int(np.searchsorted(seconds[: run.stop], 0, side="right")) - 1, run.stop - 2)
+    return slice(first, run.stop), seconds[first : run.stop]
+
+
+def unbroken_times(times: Times, when: np.datetime64) -> tuple[slice, str]:
+    """The run of times without gaps that holds a moment, or comes nearest; words on the gaps."""
+    since = (times - times[0]) / np.timedelta64(1, "s")
+    breaks = np.flatnonzero(gaps(since))
+    told = " and ".join(
+        f"{times[n].astype('datetime64[s]')}Z to {times[n + 1].astype('datetime64[s]')}Z" for n in breaks
+    )
+    run, _ = unbroken(since, float((when - times[0]) / np.timedelta64(1, "s")))
+    return run, f"no data from {told}"
 
 
 def _build(
@@ -156,7 +182,7 @@ def _build(
 ) -> tuple[OceanGrid, Seabed, Grid]:
     during, seconds = _seconds(file, epoch)
     cut = file.grid.cut(file.name, lon, lat, frame.lon, MARGIN + HALO)
-    levels = levels_for(file.name, None if file.surface else file.depth, depth)
+    levels = levels_for(file.name, None if file.surface else file.depth, depth, file.top)
     depths = file.depth[levels]
     lons, lats = (part.T for part in cut.grid.mesh())
     turn = frame.convergence(lons, lats)
@@ -177,19 +203,21 @@ def _build(
         u, v = (part[levels] for part in east_north)
         turned = np.stack([u * cos - v * sin, u * sin + v * cos], axis=-1)
         values[n] = filled(turned)[::-1, kept_i, kept_j]
-    faces = np.array([np.inf]) if file.surface else lower_faces(file.depth)
-    bottom = bottoms(wet[:, kept_i, kept_j], faces)
-    if file.seabed is not None:
-        # the model's own depth: levels of fixed depth only cut it into steps
-        own = -file.seabed[cut.rows][:, cut.columns].T[kept_i, kept_j]
-        bottom = np.where(bottom < 0, np.minimum(own, 0.0), 0.0)
+    kept_wet = wet[:, kept_i, kept_j]
+    depth_of = file.seabed[cut.rows][:, cut.columns].T[kept_i, kept_j]
+    ground = np.where(depth_of > 0, -(depth_of + DEPTH_SLACK), 0.0)
+    if file.surface:
+        closed = np.where(kept_wet[0], -np.inf, 0.0)
+    else:
+        closed = closed_below(kept_wet, file.depth, file.lower, depth_of)
     along, across = kept.grid.cell_sizes()
     flow, seabed = _assemble(
         values,
         -depths[::-1],
         seconds,
         index_map(frame, kept.grid),
-        bottom,
+        ground,
+        closed,
         float(min(along.min(), across.min())),
         0.0,
     )
@@ -201,9 +229,9 @@ def ocean_flow(
 ) -> tuple[OceanGrid, Seabed]:
     """The flow and seabed of a domain: `lon`, `lat` [degrees], `depth` [m], with a margin of two cells.
 
-    t = 0 at `epoch` (ISO 8601, UTC), which a file with several times needs. The bottom is the lower face of
-    the deepest wet cell of the nearest column, or the model's own. Above the top level, and at all depths
-    where the file names none, the current is held.
+    t = 0 at `epoch` (ISO 8601, UTC), which a file with several times needs. The bottom is that of the nearest
+    column, as `OceanFile.seabed` has it, or where its data end. Above the top level, and at all depths where
+    the file names none, the current is held.
     """
     return _ocean_flow(file, frame, lon, lat, depth, epoch)[:2]
 
@@ -213,7 +241,8 @@ def ocean_waters(
 ) -> tuple[OceanGrid, Bottom]:
     """As `ocean_flow`, and the bottom on the file's own grid."""
     flow, seabed, grid = _ocean_flow(file, frame, lon, lat, depth, epoch)
-    return flow, Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own mask")
+    # what was taken for the bottom stands among the words on the file
+    return flow, Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own file", seabed.ground.T)
 
 
 def _ocean_flow(
@@ -226,7 +255,8 @@ def _ocean_flow(
         error <= MAX_SCALE_ERROR,
         f"the domain is too wide for a flat frame, whose metres would be {100 * error:.1f} % off; narrow it",
     )
-    require(bool((seabed.bottom < 0).any()), f"the domain holds no water in {file.name}: every column is land")
+    open_somewhere = bool((seabed.bottom < -depth[0]).any())
+    require(open_somewhere, f"the domain holds no water in {file.name}: every column is land, or has no data")
     return flow, seabed, grid
 
 
@@ -248,6 +278,9 @@ def sample(
         assert when is not None
         if not file.times[0] <= when <= file.times[-1]:
             return None
+        run, _ = unbroken_times(file.times, when)
+        if not file.times[run.start] <= when <= file.times[run.stop - 1]:
+            return None
         first = int(np.searchsorted(file.times, when, side="right")) - 1
         during = slice(first, first + (1 if file.times[first] == when else 2))
         # a gap at another time is no reason to have no answer at this one
@@ -257,9 +290,9 @@ def sample(
         return None
     at_lon, at_lat = place
     if not file.surface:
-        if depth > file.depth[-1] + DEPTH_SLACK:
+        if not file.top - DEPTH_SLACK <= depth <= file.depth[-1] + DEPTH_SLACK:
             return None
-        depth = min(depth, float(file.depth[-1]))
+        depth = min(max(depth, file.top), float(file.depth[-1]))
     frame = LocalFrame(at_lon, at_lat)
     flow, seabed, _ = _build(file, frame, (at_lon, at_lon), (at_lat, at_lat), (depth, depth), when, margin=0)
     x, y = (float(part) for part in frame.to_local(at_lon, at_lat))
@@ -297,7 +330,8 @@ def grid_flow(
     """Flow and seabed from arrays on an even metric grid: x (nx), y (ny), z (nz) [m, upward], t (nt) [s].
 
     u, v [m/s] of shape (nt, nz, ny, nx), or (nz, ny, nx) if steady. NaN is no water, and so is True in `mask`
-    (ny, nx) or (nz, ny, nx). A single level is held at all depths, and then water has no bottom.
+    (ny, nx) or (nz, ny, nx). The bottom is the deepest level with water; where that is the last, half a level
+    further there are no data. A single level is held at all depths, and then water has no bottom.
     """
     (x, turn_x), (y, turn_y), (z, turn_z) = (
         _rising(x, "x", True),
@@ -327,7 +361,11 @@ def grid_flow(
         values = values[::-1]
     wet = np.isfinite(values[..., 0]).all(axis=0)
     require(bool(wet[0].any()), "the grid holds no water: `u` and `v` are NaN or masked in every column")
-    faces = np.array([np.inf]) if z.size == 1 else lower_faces(-z[::-1])
+    levels = -z[::-1]
+    count = np.cumprod(wet, axis=0).sum(axis=0)
+    deepest = np.append(levels, np.inf)[np.where(count == len(wet), len(wet), count - 1)]
+    ground = np.where(count > 0, -deepest, 0.0)
+    closed = np.where(wet[0], -np.inf, 0.0) if z.size == 1 else closed_below(wet, levels, levels, deepest)
     corner = np.array([[[0, 0], [0, y.size - 1]], [[x.size - 1, 0], [x.size - 1, y.size - 1]]], dtype=np.float64)
     width, height = float(x[-1] - x[0]), float(y[-1] - y[0])
     box = (float(x[0]), float(x[-1]), float(y[0]), float(y[-1]))
@@ -335,4 +373,4 @@ def grid_flow(
     full = np.stack([filled(step)[::-1] for step in values])
     spacing = min(width / (x.size - 1), height / (y.size - 1))
     one = None if times is None or times.size == 1 else times
-    return _assemble(full, z, one, at, bottoms(wet, faces), spacing, clearance)
+    return _assemble(full, z, one, at, ground, closed, spacing, clearance)

@@ -2,19 +2,30 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ...base.arrays import Array
+from ...base.arrays import Array, Bools
 from ...base.checks import Range
+from ...base.errors import InputError
 from ...base.settings import require
 from ..frame import LocalFrame, eastward, wrapped
 
 Index = NDArray[np.intp]
 
+
+class OutsideError(InputError):
+    """A domain that lies partly outside a grid."""
+
+
 EARTH = 6_371_000.0
+WIDE = 5.0
+"""A spacing that is more than so many times the usual one may be a gap, between whose ends there is no data."""
+STEEP = 3.0
+"""It is one where it is also so many times the spacings beside it: a stretched axis grows by less."""
 EDGE = 0.01
 """A point is on the grid up to this far beyond its ends, in cells: degrees come rounded."""
 EVEN = 1e-3
@@ -27,6 +38,41 @@ NEWTON_STEPS = 12
 """Newton's steps to invert a cell; three do where cells are alike."""
 SETTLED = 1e-10
 """A step of Newton's this small is the last, in cells."""
+
+
+def gaps(axis: Array) -> Bools:
+    """Which steps (n - 1) of a rising axis are gaps: far wider than the usual one and than those beside them.
+
+    At most two in a row, around a single point; more are another spacing, and the last step needs a second.
+    """
+    steps = np.diff(np.asarray(axis, np.float64))
+    found = np.zeros(steps.size, dtype=bool)
+    if steps.size < 3:
+        return found
+    wide = steps > WIDE * np.median(steps)
+    at = 0
+    while at < steps.size:
+        end = at
+        while end < steps.size and wide[end]:
+            end += 1
+        beside = [steps[n] for n in (at - 1, end) if 0 <= n < steps.size]
+        few = end - at <= len(beside)
+        if end > at and few and bool(steps[at:end].min() > STEEP * max(beside)):
+            found[at:end] = True
+        at = max(end, at + 1)
+    return found
+
+
+def unbroken(axis: Array, at: float) -> tuple[slice, str]:
+    """The run of a rising axis without gaps that holds a value, or comes nearest; words on the gaps."""
+    breaks = np.flatnonzero(gaps(axis)) + 1
+    if not breaks.size:
+        return slice(0, axis.size), ""
+    edges = [0, *map(int, breaks), axis.size]
+    runs = [slice(first, end) for first, end in pairwise(edges)]
+    off = [max(axis[run.start] - at, at - axis[run.stop - 1], 0.0) for run in runs]
+    between = " and ".join(f"{axis[n - 1]:.6g} to {axis[n]:.6g}" for n in breaks[:3])
+    return runs[int(np.argmin(off))], f", with no data from {between}"
 
 
 def unit_vectors(lon: Array, lat: Array) -> Array:
@@ -86,8 +132,9 @@ class LonLatGrid:
     def nearest_place(self, lon: float, lat: float) -> tuple[float, float] | None:
         """The place itself, or the next one on the grid if rounding put it beside; None where there is none."""
         _, lons = columns(self.lon, lon)
-        slack_lon, slack_lat = EDGE * np.diff(lons).max(initial=0), EDGE * np.diff(self.lat).max(initial=0)
-        at_lon, at_lat = float(np.clip(lon, lons[0], lons[-1])), float(np.clip(lat, self.lat[0], self.lat[-1]))
+        lats = self.lat[unbroken(self.lat, lat)[0]]
+        slack_lon, slack_lat = EDGE * np.diff(lons).max(initial=0), EDGE * np.diff(lats).max(initial=0)
+        at_lon, at_lat = float(np.clip(lon, lons[0], lons[-1])), float(np.clip(lat, lats[0], lats[-1]))
         off = abs(at_lon - lon) > slack_lon or abs(at_lat - lat) > slack_lat
         return None if off else (at_lon, at_lat)
 
@@ -98,15 +145,18 @@ class LonLatGrid:
         middle = float(wrapped((west + east) / 2, centre))
         half = (east - west) / 2
         lon = (middle - half, middle + half)
-        for what, axis, bounds in (("longitude", lons, lon), ("latitude", self.lat, lat)):
+        run, no_lat = unbroken(self.lat, (lat[0] + lat[1]) / 2)
+        lats, no_lon = self.lat[run], unbroken(self.lon, float(wrapped(middle, float(self.lon.mean()))))[1]
+        for what, axis, bounds, none in (("longitude", lons, lon, no_lon), ("latitude", lats, lat, no_lat)):
             require(bounds[0] <= bounds[1], f"the domain's {what} must rise; got {bounds[0]:g} to {bounds[1]:g}")
             slack = EDGE * np.diff(axis).max() if axis.size > 1 else 0.0
-            require(
-                axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack,
-                f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
-                f"which holds {axis[0]:.6g} to {axis[-1]:.6g}",
-            )
-        across, rows = span(lons, lon, margin), span(self.lat, lat, margin)
+            if not (axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack):
+                raise OutsideError(
+                    f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
+                    f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{none}"
+                )
+        across, within = span(lons, lon, margin), span(lats, lat, margin)
+        rows = slice(within.start + run.start, within.stop + run.start)
         return Cut(rows, which[across], LonLatGrid(lons[across], self.lat[rows]))
 
     def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:
@@ -165,15 +215,39 @@ class CurvedGrid:
         at = part.indices(frame, np.zeros(1), np.zeros(1))[0]
         last = np.array(part.shape[::-1]) - 1.0
         inside = bool((at >= -EDGE).all() and (at <= last + EDGE).all())
+        inside &= bool(self._open(at, (near[0].start, near[1].start)))
         # a part's edge within the grid lies three cells away
         return (lon, lat) if inside else None
+
+    @cached_property
+    def _gaps(self) -> Bools:
+        """Cells (ny - 1, nx - 1) with a side across which the file has no data."""
+        at = self._vectors
+        result = np.zeros((self.shape[0] - 1, self.shape[1] - 1), dtype=bool)
+        for axis in (0, 1):
+            steps = np.linalg.norm(np.diff(at, axis=axis), axis=-1)
+            # along the middle row or column; a gap goes through all of them
+            middle = np.moveaxis(steps, axis, 0)[:, steps.shape[1 - axis] // 2]
+            for n in np.flatnonzero(gaps(np.concatenate([[0.0], np.cumsum(middle)]))):
+                result[(n, slice(None)) if axis == 0 else (slice(None), n)] = True
+        return result
+
+    def _open(self, at: Array, first: tuple[int, int]) -> Bools:
+        """Whether fractional indices (..., 2) of a part that begins at `first` (row, column) lie in no gap."""
+        cell = np.floor(at).astype(np.int64) + np.array(first[::-1])
+        i, j = (np.clip(cell[..., n], 0, self.shape[1 - n] - 2) for n in range(2))
+        return np.asarray(~self._gaps[j, i])
 
     def _box(self, lon: Array, lat: Array, margin: int) -> tuple[slice, slice]:
         """The rows and columns about the points nearest to some places."""
         tree = KDTree(self._vectors.reshape(-1, 3))
         nearest = np.asarray(tree.query(unit_vectors(lon, lat))[1])
         j, i = np.unravel_index(nearest, self.shape)
-        return tuple(slice(max(0, int(at.min()) - margin), int(at.max()) + margin + 1) for at in (j, i))  # type: ignore[return-value]
+        rows, across = (
+            slice(max(0, int(at.min()) - margin), min(size, int(at.max()) + margin + 1))
+            for at, size in ((j, self.shape[0]), (i, self.shape[1]))
+        )
+        return rows, across
 
     def cut(self, name: str, lon: Range, lat: Range, centre: float, margin: int) -> Cut:
         """As LonLatGrid says; columns are not joined across a seam of the file."""
@@ -187,12 +261,16 @@ class CurvedGrid:
         last = np.array(part.shape[::-1]) - 1.0
         inside = bool((at >= -EDGE).all() and (at <= last + EDGE).all())
         own_lon, own_lat = self.bounds
-        require(
-            inside,
-            f"the domain, longitude {lon[0]:g} to {lon[1]:g} and latitude {lat[0]:g} to {lat[1]:g}, lies partly "
-            f"outside {name} or across its seam; it holds longitude {own_lon[0]:.6g} to {own_lon[1]:.6g}, "
-            f"latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows",
-        )
+        domain = f"the domain, longitude {lon[0]:g} to {lon[1]:g} and latitude {lat[0]:g} to {lat[1]:g}, lies"
+        if not inside:
+            raise OutsideError(
+                f"{domain} partly outside {name} or across its seam; it holds longitude {own_lon[0]:.6g} to "
+                f"{own_lon[1]:.6g}, latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows"
+            )
+        if not self._open(at, (rows.start, across.start)).all():
+            raise OutsideError(
+                f"{domain} across a gap between the rows or columns of {name}, where it holds no data"
+            )
         return Cut(rows, np.arange(self.shape[1])[across], part)
 
     def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:
@@ -252,7 +330,8 @@ def columns(lon: Array, centre: float) -> tuple[Index, Array]:
     turned = wrapped(lon, centre)
     order = np.argsort(turned, kind="stable")
     turned = turned[order]
-    breaks = np.flatnonzero(np.diff(turned) > 1.5 * np.diff(lon).max()) + 1
+    steps = np.diff(lon)
+    breaks = np.flatnonzero(np.diff(turned) > 1.5 * steps[~gaps(lon)].max()) + 1
     runs = np.split(np.arange(lon.size), breaks)
     run = max(runs, key=lambda r: (bool(turned[r[0]] <= centre <= turned[r[-1]]), r.size))
     return order[run], turned[run]

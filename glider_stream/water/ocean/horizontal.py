@@ -8,7 +8,8 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from .names import WORDS, Catalogue, standard_name
+from .names import WORDS, Catalogue, standard_name, units_of
+from .units import in_metres
 
 
 def horizontal_of(at: Catalogue, variable: Any, component: str) -> tuple[tuple[str, str], Any, Any]:
@@ -83,8 +84,7 @@ def _projected(at: Catalogue, variable: Any) -> tuple[tuple[str, str], Any, Any]
     try:
         crs = CRS.from_cf(dict(at.data[mapping].attrs))
         across = Transformer.from_crs(crs, CRS.from_epsg(4326), always_xy=True)
-        scale = {"km": 1000.0, "kilometer": 1000.0, "kilometers": 1000.0}
-        flat = [one.values.astype(np.float64) * scale.get(str(one.attrs.get("units")), 1.0) for one in (x, y)]
+        flat = [one.values.astype(np.float64) * _plane_unit(at, one) for one in (x, y)]
         east, north = np.meshgrid(*flat)
         lon, lat = across.transform(east, north, errcheck=True)
     except (ProjError, KeyError, TypeError, ValueError) as error:
@@ -92,6 +92,21 @@ def _projected(at: Catalogue, variable: Any) -> tuple[tuple[str, str], Any, Any]
     rows = (str(y.dims[0]), str(x.dims[0]))
     made = [xarray.DataArray(part, dims=rows, name=name) for name, part in ((axes[0], lon), (axes[1], lat))]
     return rows, made[0], made[1]
+
+
+def _plane_unit(at: Catalogue, axis: Any) -> float:
+    """Metres of the unit of a plane's x or y, such as "km" or "100 km"; 1 for degrees of a turned pole."""
+    units = units_of(axis)
+    if units.lower().startswith(("degree", "rad")):
+        return 1.0
+    match = re.fullmatch(r"([\d.]*)\s*([a-zA-Z]*)", units)
+    factor = None if match is None else in_metres(match.group(2))
+    if match is None or factor is None:
+        raise InputError(
+            f"`{axis.name}` in {at.name} is in {units!r}, which is no length that is known: add the file of "
+            "two-dimensional longitudes, or convert it to metres"
+        )
+    return factor * float(match.group(1) or 1.0)
 
 
 def _plane_axis(at: Catalogue, variable: Any, which: str) -> str | None:

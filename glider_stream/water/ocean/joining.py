@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ...base.arrays import Array
+from ...base.arrays import Array, Bools
 from ...base.errors import InputError
 from ...base.settings import require
-from .file import OceanFile
+from .file import OceanFile, Times
 from .grid import Grid, grid_of, unit_vectors
-from .land import mark_land
+from .land import Evidence, both_still, mark_land
+from .levels import Levels, check_hold
 from .names import WORDS, Names
 from .part import Field, Part
 from .stagger import AGREES, collocated, half_a_cell_on, row_angle, same_points, turned
@@ -38,7 +39,7 @@ def _stacked(name: str, parts: list[Part]) -> Part:
     """The parts of one component, one after the other in time."""
     first = parts[0]
     for part in parts[1:]:
-        same = _same(part.depth, first.depth) and same_points(part.grid.mesh(), first.grid.mesh())
+        same = _same(part.levels.depth, first.levels.depth) and same_points(part.grid.mesh(), first.grid.mesh())
         require(
             same,
             f"{name}: the currents are on different points ({_extent(first.grid)}, and {_extent(part.grid)}); "
@@ -47,11 +48,19 @@ def _stacked(name: str, parts: list[Part]) -> Part:
     if len(parts) == 1:
         return first
     known = [part.times for part in parts if part.times is not None]
-    require(len(known) == len(parts), f"{name}: of several files, each must say its time; at least one does not")
+    require(
+        len(known) == len(parts),
+        f"{name}: of several files, each must say its time; at least one does not: if each holds one step, name "
+        "`origin`, the date of the first, and `step`, the hours from file to file, in `names`",
+    )
     times, values = np.concatenate(known), np.concatenate([part.values for part in parts])
     rank = np.argsort(times, kind="stable")
     notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
-    return replace(first, times=times[rank], values=values[rank], notes=notes)
+    deeper = first.deeper
+    for part in parts[1:]:
+        if deeper is not None and part.deeper is not None:
+            deeper = np.where(np.abs(part.deeper) > np.abs(deeper), part.deeper, deeper)
+    return replace(first, times=times[rank], values=values[rank], notes=notes, deeper=deeper)
 
 
 def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
@@ -64,22 +73,19 @@ def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
         both.append(_stacked(name, own))
     east, north = both
     require(_same(east.times, north.times), f"{name}: east and north currents are given at different times")
-    moments = east.times
-    if moments is not None and moments.size > 1:
-        again = moments[1:][np.diff(moments) <= np.timedelta64(0, "ms")]
-        require(again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap")
-    depth = _depths_of_both(name, east, north)
-    grid, u, v, staggered = _on_one_grid(name, east, north, said)
+    moments = _stamped(name, east.times, said)
+    levels = _levels_of_both(name, east, north)
     notes = list(dict.fromkeys(note for part in both for note in part.notes))
-    if staggered:
-        notes.append("u and v lie on points of their own (a C-grid): brought to the cells' centres")
-    u, v, more = _toward_east(name, grid, east, north, u, v, staggered)
+    grid, u, v, deeper, more = _together(name, east, north, said)
     notes += more
 
     missing = np.isnan(u) | np.isnan(v)
-    fills = bool(missing.any())
     u[missing] = v[missing] = np.nan
-    notes += mark_land(u, v, fills)
+    depth = _model_depth(east, north, grid)
+    known = None if depth is None else np.isfinite(depth)
+    zeros = both_still(east.zeros, north.zeros)
+    found = mark_land(name, u, v, deeper, zeros, known, said.zeros)
+    notes += found
     data = np.isfinite(u)
     wet, ever = np.asarray(data.all(axis=0)), np.asarray(data.any(axis=0))
     require(bool(ever.any()), f"{name} holds no current at all: every value is missing or zero")
@@ -87,23 +93,148 @@ def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
         notes.append(
             f"{100 * gaps / ever.sum():.1f} % of the wet points have gaps in time; plans keep out of these"
         )
-    if depth is None:
+    surface = levels.depth is None or check_hold(name, said.hold, levels)
+    if levels.depth is None:
         notes.append("the file names no depth: its current is taken as the surface's and held at all depths")
+    elif surface:
+        notes.append(f"its one level, at {levels.depth[0]:g} m, is held at all depths, as you say")
     if moments is None or moments.size == 1:
         notes.append("a single time: the current is taken as steady")
+    seabed, mismatch = _seabed(ever, deeper, levels, depth, surface)
+    notes += mismatch
     merged = {key: what for part in (north, east) for key, what in part.took.items()}
     took = {key: merged[key] for key in ("u", "v", *WORDS) if key in merged}
-    seabed = east.fields.get("seabed")
-    floor = None if seabed is None else _seabed_at(seabed, north.fields.get("seabed"), grid)
-    levels = np.zeros(1) if depth is None else depth
-    return OceanFile(name, grid, levels, moments, u, v, wet, depth is None, took, tuple(notes), floor)
+    took |= _assumed(east, levels, depth, surface, missing, zeros, found)
+    return OceanFile(
+        name,
+        grid,
+        np.zeros(1) if levels.depth is None or surface else levels.depth,
+        moments,
+        u,
+        v,
+        wet,
+        surface,
+        took,
+        tuple(dict.fromkeys(notes)),
+        seabed,
+        np.array([np.inf]) if levels.lower is None or surface else levels.lower,
+        0.0 if surface else levels.top,
+    )
 
 
-def _depths_of_both(name: str, east: Part, north: Part) -> Array | None:
-    """The levels of both components; of terrain-following ones, u's: v is read on the same where they differ."""
-    if _same(east.depth, north.depth):
-        return east.depth
+def _assumed(
+    east: Part,
+    levels: Levels,
+    depth: Array | None,
+    surface: bool,
+    missing: NDArray[np.bool_],
+    zeros: Evidence,
+    found: list[str],
+) -> dict[str, str]:
+    """What was assumed of bottom, land, levels and times, in a few words each."""
+    field = east.fields.get("seabed")
+    if depth is not None and field is not None:
+        bottom = f"the model's depth `{field.name}`"
+    elif surface:
+        bottom = "unknown: the current of one level is held at all depths"
+    else:
+        bottom = f"{levels.bottom}, unknown where they go on to the last level"
+    ways = []
+    if zeros.masked:
+        ways.append("a mask of the file")
+    if missing.any():
+        ways.append("missing values")
+    ways += [
+        f"zeros ({'land' if 'as land' in note else 'seabed'})"
+        for note in found
+        if "taken as land" in note or "taken as seabed" in note or "are land, as you say" in note
+    ]
+    extent = "the surface, held at all depths" if levels.depth is None else levels.extent
+    if surface and levels.depth is not None:
+        extent = f"{levels.depth[0]:g} m, held at all depths, as you say"
+    return {
+        "bottom": bottom,
+        "land": ", ".join(ways) or "none: every point has data",
+        "levels": extent,
+        "stamps": east.took.get("stamps", ""),
+    }
+
+
+def _stamped(name: str, times: Times | None, said: Names) -> Times | None:
+    """Times moved to the middle of their intervals, by the user's word; in order, none given twice."""
+    if times is None or times.size < 2:
+        require(
+            said.stamps is None or said.stamps == "middle",
+            f"`stamps` = {said.stamps!r} needs two times to tell the interval of {name}, which has fewer",
+        )
+        return times
+    again = times[1:][np.diff(times) <= np.timedelta64(0, "ms")]
+    require(again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap")
+    steps = np.diff(times)
+    if said.stamps == "start":
+        return np.asarray(times + np.append(steps, steps[-1]) // 2)
+    if said.stamps == "end":
+        return np.asarray(times - np.append(steps[:1], steps) // 2)
+    return times
+
+
+def _levels_of_both(name: str, east: Part, north: Part) -> Levels:
+    """The levels of both components, which must be the same."""
+    if _same(east.levels.depth, north.levels.depth):
+        return east.levels
     raise InputError(f"{name}: the currents are given at different depths; bring them onto the same levels first")
+
+
+def _together(
+    name: str, east: Part, north: Part, said: Names
+) -> tuple[Grid, Values, Values, tuple[Values, Values] | None, list[str]]:
+    """u and v on one grid, toward true east and north, and so what lies below the levels; notes."""
+    grid, u, v, staggered = _on_one_grid(name, east, north, said)
+    notes = ["u and v lie on points of their own (a C-grid): brought to the cells' centres"] if staggered else []
+    u, v, more = _toward_east(name, grid, east, north, u, v, staggered)
+    deeper = None
+    if east.deeper is not None and north.deeper is not None:
+        below = replace(east, values=east.deeper), replace(north, values=north.deeper)
+        _, down_u, down_v, _ = _on_one_grid(name, *below, said)
+        down_u, down_v, _ = _toward_east(name, grid, *below, down_u, down_v, staggered)
+        gone = np.isnan(down_u) | np.isnan(down_v)
+        deeper = np.where(gone, np.float32(np.nan), down_u), np.where(gone, np.float32(np.nan), down_v)
+    return grid, u, v, deeper, notes + more
+
+
+def _model_depth(east: Part, north: Part, grid: Grid) -> Array | None:
+    """The model's own depth (ny, nx) [m, downward] at the grid's points, NaN where it is not known."""
+    first, second = east.fields.get("seabed"), north.fields.get("seabed")
+    if first is None:
+        return None
+    if east.levels.sigma is not None:
+        return _seabed_at(first, second, grid)
+    return first.least(*grid.mesh())
+
+
+def _seabed(
+    ever: Bools, deeper: tuple[Values, Values] | None, levels: Levels, depth: Array | None, surface: bool
+) -> tuple[Array, list[str]]:
+    """Depth of the seabed (ny, nx) [m]: the model's own, else by the deepest level with data; inf if unknown."""
+    wet = ever if deeper is None else np.concatenate([ever, np.isfinite(deeper[0][0])])
+    count = np.cumprod(wet, axis=0).sum(axis=0)
+    if surface or levels.every is None:
+        found = np.where(count > 0, np.inf, 0.0)
+    else:
+        found = np.where(count == len(wet), np.inf, levels.every[np.maximum(count, 1) - 1])
+        found = np.where(count > 0, found, 0.0)
+    if depth is None:
+        return found, []
+    if levels.sigma is not None:
+        # cut to their upper or lower levels, they still say how deep it is
+        return np.where((count > 0) | (np.isfinite(depth) & ~levels.sigma.whole), depth, 0.0), []
+    unlike = (count > 0) & np.isnan(depth)
+    notes = []
+    if unlike.any():
+        notes.append(
+            f"{int(unlike.sum())} columns have currents but no depth of the model: bottom by their levels"
+        )
+    return np.where((count > 0) & np.isfinite(depth), depth, found), notes
 
 
 def _on_one_grid(name: str, east: Part, north: Part, said: Names) -> tuple[Grid, Values, Values, bool]:
@@ -114,7 +245,7 @@ def _on_one_grid(name: str, east: Part, north: Part, said: Names) -> tuple[Grid,
         lon, lat, u, v = half_a_cell_on(u_at, east.values, north.values)
         return grid_of(lon, lat), u, v, True
     if same_points(u_at, v_at):
-        apart = {"depthu", "depthv"} <= {east.levels_name.lower(), north.levels_name.lower()}
+        apart = {"depthu", "depthv"} <= {east.levels.name.lower(), north.levels.name.lower()}
         if apart and said.stagger is None:
             raise InputError(
                 f"`{east.variable}`, `{north.variable}` of {name} are of a staggered grid (depthu, depthv), "

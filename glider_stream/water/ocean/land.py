@@ -1,11 +1,14 @@
 """Land in current files: masks, fills that are not declared, and zeros."""
 
 import re
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import Bools
+from ...base.errors import InputError
 from ...base.settings import require
 from .names import Names, standard_name
 
@@ -15,6 +18,8 @@ NO_DATA = 1e3
 """No unit of a current makes such a number: a fill that the file does not declare."""
 FASTEST = 9.0
 """No ocean current is as fast [m/s]: a fill, or another unit."""
+ALONE = 2
+"""So many neighbouring points of exactly 0 m/s are calm, as a radar measures it; more are written so."""
 SEA_IS_ONE = re.compile(
     r"^([tuv]mask(util)?|mask_(rho|u|v|t)|wet(_[cuvt])?|sea_binary_mask|sea_mask)$", re.IGNORECASE
 )
@@ -89,24 +94,105 @@ def clear_marks(file: str, name: str, values: Values, factor: float | None) -> t
     return values, (f"`{name}` = {marks[0] / (factor or 1.0):g} is taken as no data",)
 
 
-def mark_land(u: Values, v: Values, fills: bool) -> list[str]:
-    """NaN where land is written as zeros: still water at all times, in the whole column.
+@dataclass(frozen=True)
+class Evidence:
+    """What a file says of its zeros, wherever a domain is cut: `still` (ny, nx) is its whole uppermost level.
 
-    A file without any fill writes its seabed so as well: then also still water down to the last level.
+    `still`: where the current is exactly 0 at the first time; `fills`: whether a point of it has no value;
+    `masked`: dimensions of the mask that was used, 0 if none; `levels`: how many the file has.
     """
-    still, known = np.ones(u.shape[1:], dtype=bool), np.zeros(u.shape[1:], dtype=bool)
-    for east, north in zip(u, v, strict=True):
-        missing = np.isnan(east)
-        still &= ((east == 0) & (north == 0)) | missing
-        known |= ~missing
-    land = still.all(axis=0) & known.any(axis=0)
-    dry = np.broadcast_to(land, still.shape).copy()
-    if not fills:
-        dry |= np.cumprod(still[::-1], axis=0)[::-1].astype(bool)
-    u[:, dry] = v[:, dry] = np.nan
-    notes = []
-    if land.any():
-        notes.append(f"{int(land.sum())} columns with no current at any time or depth are taken as land")
-    if (under := int((dry & ~land).sum())) > 0:
-        notes.append(f"{under} points with no current at any time, down to the last level, are taken as seabed")
+
+    still: Bools
+    fills: bool
+    masked: int
+    levels: int
+
+    def patch(self) -> int:
+        """Points of the largest patch of zeros: calm is measured here and there, land is wide."""
+        from scipy.ndimage import label
+
+        patches, count = label(self.still, structure=np.ones((3, 3)))
+        return int(np.bincount(patches.ravel())[1:].max()) if count else 0
+
+    def wide(self) -> bool:
+        """Whether a patch of zeros holds three by three points."""
+        from scipy.ndimage import binary_erosion
+
+        return bool(binary_erosion(self.still, structure=np.ones((3, 3), dtype=bool)).any())
+
+
+def both_still(one: Evidence, other: Evidence) -> Evidence:
+    """Where both components are 0; of a staggered grid the rows and columns that both have."""
+    ny, nx = (min(a, b) for a, b in zip(one.still.shape, other.still.shape, strict=True))
+    still = one.still[:ny, :nx] & other.still[:ny, :nx]
+    fewest = min(one.masked, other.masked)
+    return Evidence(still, one.fills or other.fills, fewest, max(one.levels, other.levels))
+
+
+def _columns_of_land(name: str, still: Bools, evidence: Evidence, said: str | None) -> tuple[Bools, list[str]]:
+    """Which columns (ny, nx), still at all times and depths, are land; what was assumed."""
+    none = np.zeros_like(still)
+    count = int(still.sum())
+    if count == 0 or said == "calm":
+        return none, [f"{count} columns without any current are calm water, as you say"] if count else []
+    if said == "land":
+        return still, [f"{count} columns without any current are land, as you say"]
+    if evidence.masked:
+        return none, [f"{count} columns without any current are open by the mask: taken as calm water"]
+    if evidence.levels < 2 and evidence.fills and evidence.wide():
+        raise InputError(
+            f"{name} holds both missing values and wide patches of exactly 0 m/s ({evidence.patch()} points "
+            'together), which may be land or calm water: name `zeros` in `names`, "land" or "calm"'
+        )
+    few = 'calm water: they lie apart from each other; name `zeros` = "land" in `names` if they are land'
+    if evidence.patch() <= ALONE or (evidence.levels < 2 and evidence.fills):
+        return none, [f"{count} columns of exactly 0 m/s are taken as {few}"]
+    return still, [
+        f"{count} columns with no current at any time or depth are taken as land; "
+        'name `zeros` = "calm" in `names` if they are water'
+    ]
+
+
+def mark_land(
+    name: str,
+    u: Values,
+    v: Values,
+    deeper: tuple[Values, Values] | None,
+    evidence: Evidence,
+    known: Bools | None,
+    said: str | None,
+) -> list[str]:
+    """NaN, in place, where land and seabed are written as zeros; notes on what was assumed.
+
+    u, v (nt, nz, ny, nx) and the levels below them, `deeper` (1, n, ny, nx) each. A column without any current
+    is land by what the file's zeros look like (`evidence`). Zeros from some level down to the last one of the
+    file are seabed, column by column: what a fill says elsewhere says nothing here. Not where a fill lies
+    beneath them, nor where the model's depth is `known` (ny, nx): there the seabed has another mark.
+    """
+    blocks = [(u, v)] if deeper is None else [(u, v), deeper]
+    parts = []
+    for east, north in blocks:
+        still, held = np.ones(east.shape[1:], dtype=bool), np.zeros(east.shape[1:], dtype=bool)
+        for a, b in zip(east, north, strict=True):
+            missing = np.isnan(a)
+            still &= ((a == 0) & (b == 0)) | missing
+            held |= ~missing
+        parts.append((still, held))
+    still, held = (np.concatenate([part[n] for part in parts]) for n in range(2))
+    whole = np.asarray(still.all(axis=0) & held.any(axis=0))
+    land, notes = _columns_of_land(name, whole, evidence, said)
+    under = np.cumprod((still & held)[::-1], axis=0)[::-1].astype(bool) & ~whole
+    if known is not None:
+        under &= ~known
+    if evidence.masked > 2 or evidence.levels < 2 or said == "calm":
+        under[:] = False
+    dry = under | land
+    levels = u.shape[1]
+    for (east, north), part in zip(blocks, (dry[:levels], dry[levels:]), strict=False):
+        east[:, part] = north[:, part] = np.nan
+    if under.any():
+        notes.append(
+            f"{int(under.sum())} points with no current at any time, down to the last level, are taken as "
+            'seabed; name `zeros` = "calm" in `names` if they are water'
+        )
     return notes

@@ -34,6 +34,7 @@ SHORT_NAMES = [
     ("ucur", "vcur"),
     ("ssu", "ssv"),
     ("uu", "vv"),
+    ("ewct", "nsct"),
     ("eastward_eulerian_current_velocity", "northward_eulerian_current_velocity"),
 ]
 IN_METRES = {"uo", "vo", "uos", "vos", "utotal", "vtotal", "water_u", "water_v", "ugos", "vgos"}
@@ -45,6 +46,11 @@ LONG_NAMES = [
         r"(?=.*\b(northward|meridional)\b)(?=.*\b(current|velocity)\b)",
     )
 ]
+SENSE_OF_U = re.compile(r"\b(eastward|zonal|west.east|x.(velocity|component|direction)|u.(velocity|component))\b")
+SENSE_OF_V = re.compile(
+    r"\b(northward|meridional|south.north|y.(velocity|component|direction)|v.(velocity|component))\b"
+)
+"""Long names that say which component a variable is."""
 NO_CURRENT = re.compile(r"\bwind|stress|stokes|flag|\berror|quality|uncertain|\bice\b|\bair\b|\bstd|variance")
 A_PART = re.compile(r"\btid(e|al)|geostrophic|anomal|barotropic|baroclinic|depth.?averag")
 """A long name that says so is not the whole current."""
@@ -59,7 +65,7 @@ AXIS_NAMES = {
     "lon": {"lon", "longitude", "lons", "long", "nav_lon", "lon_rho", "lon_u", "lon_v", "lon_psi", "xlong"},
     "lat": {"lat", "latitude", "lats", "nav_lat", "lat_rho", "lat_u", "lat_v", "lat_psi", "xlat"},
     "depth": {"depth", "depths", "deptht", "depthu", "depthv", "z", "st_ocean", "z_t", "lev", "level_depth"},
-    "time": {"time", "times", "mt", "ocean_time", "time_counter", "date_time"},
+    "time": {"time", "times", "mt", "ocean_time", "time_counter", "date_time", "valid_time"},
 }
 AXIS_NAMES["lon"] |= {"glamt", "glamu", "glamv", "glamf", "geolon", "geolon_c", "geolon_t", "geolon_u"}
 AXIS_NAMES["lon"] |= {
@@ -84,6 +90,10 @@ ELSEWHERE = re.compile(r"(lam[ft]|phi[ft]|_psi|_t|_rho|^tl(on|at|ong))$", re.IGN
 """Coordinates of the points of tracers and of corners."""
 OTHERS = re.compile(r"^(tl(on|at|ong)|glam[ft]|gphi[ft]|geo(lon|lat)_t|(lon|lat)_psi)$", re.IGNORECASE)
 """Coordinates at which no current is given, unless its own `coordinates` say so."""
+UNFIT_FOR_DEGREES = ("m", "km", "meters", "metres", "meter", "metre", "1")
+"""Units of a plane's own axes, which are no degrees."""
+SINCE = re.compile(r"\bsince\s+[-+]?\d", re.IGNORECASE)
+"""Part of a unit of time that says when the count begins."""
 CF_AXES = {"longitude": "lon", "latitude": "lat", "vertical": "depth", "time": "time"}
 WORDS = {"lon": "longitude", "lat": "latitude", "depth": "depth", "time": "time"}
 SIGMA = re.compile(r"ocean_(s|sigma|double_sigma)")
@@ -93,11 +103,17 @@ SIGMA = re.compile(r"ocean_(s|sigma|double_sigma)")
 class Names:
     """What a user says about a file; None is for the file to say.
 
-    `u`, `v`: the currents' variables; `lon`, `lat`, `depth`, `time`: their coordinates; `mask`: that of land.
+    `u`, `v`: the currents' variables; `lon`, `lat`, `depth`, `time`: their coordinates; `mask`: that of land;
+    `bottom`: the model's depth; `quality`: the flag of quality. Of these three, "none" leaves it out.
     `units`: of the currents. `positive`: "down" or "up", the sense of the depths. `rotate`: "none" where u, v
     are toward east and north, "grid" where along the grid's rows and columns, or the variable of the angle
     from east to the rows. `stagger`: "none" where both lie at the coordinates given, "nemo" where u lies half
     a cell along the rows from there and v half a cell across them. `land`: the mask's value there, 0 or 1.
+    `zeros`: what currents of exactly 0 are, "land" (or seabed) or "calm" water. `hold`: "all" holds the one
+    level of a file at all depths. `stamps`: where in the interval of a mean its time stands, "start",
+    "middle" or "end". `origin`: the date from which times count; with `step` [hours], the date of the first
+    of several files that do not say their time. `member` and `run`: which of an ensemble, and of several
+    forecasts, by its number or its date. `group`: of a NetCDF-4 file.
     """
 
     u: str | None = None
@@ -112,18 +128,62 @@ class Names:
     stagger: str | None = None
     mask: str | None = None
     land: int | None = None
+    bottom: str | None = None
+    quality: str | None = None
+    zeros: str | None = None
+    hold: str | None = None
+    stamps: str | None = None
+    origin: str | None = None
+    step: float | None = None
+    member: int | str | None = None
+    run: int | str | None = None
+    group: str | None = None
 
     def __post_init__(self) -> None:
-        for name, choices in {"positive": ("up", "down"), "stagger": ("none", "nemo")}.items():
+        for name, choices in CHOICES.items():
             value = getattr(self, name)
             said = " or ".join(f'"{choice}"' for choice in choices)
             require(value is None or value in choices, f"`{name}` must be {said}; got {value!r}")
         require(self.land in (None, 0, 1), f"`land` must be 0 or 1; got {self.land!r}")
+        require(self.step is None or self.step > 0, f"`step` must be above 0 hours; got {self.step}")
+        require(
+            self.step is None or self.origin is not None,
+            "`step` needs the date of the first file; name `origin`, too, such as 2024-11-20T00:00",
+        )
+
+    def variables(self) -> dict[str, str]:
+        """Keys and values of those that name a variable of the file."""
+        keys = ("u", "v", "lon", "lat", "depth", "time", "mask", "bottom", "quality")
+        given = {key: getattr(self, key) for key in keys}
+        if self.rotate not in (None, "none", "grid"):
+            given["rotate"] = self.rotate
+        leaves_out = {"mask", "bottom", "quality"}
+        return {
+            key: name
+            for key, name in given.items()
+            if name is not None and not (name == "none" and key in leaves_out)
+        }
+
+
+CHOICES = {
+    "positive": ("up", "down"),
+    "stagger": ("none", "nemo"),
+    "zeros": ("land", "calm"),
+    "hold": ("all",),
+    "stamps": ("start", "middle", "end"),
+}
+"""What some of the names may be."""
 
 
 def standard_name(variable: Any) -> str:
-    """The CF standard name in lower case, or nothing."""
-    return str(variable.attrs.get("standard_name", "")).strip().lower()
+    """The CF standard name in lower case, or nothing; CROCO's, without the points that it adds."""
+    return re.sub(r"_at_[a-z]+_locations?$", "", str(variable.attrs.get("standard_name", "")).strip().lower())
+
+
+def units_of(variable: Any) -> str:
+    """The unit that a variable gives, under any spelling of the attribute, or nothing."""
+    attrs = variable.attrs
+    return next((str(attrs[key]).strip() for key in ("units", "unit", "Unit", "Units") if key in attrs), "")
 
 
 def listing(names: Iterable[Any]) -> str:
@@ -160,6 +220,35 @@ class Catalogue:
                 partial = partial or found
         return partial
 
+    def check_sense(self, component: str, name: str) -> tuple[str, ...]:
+        """InputError where a variable's standard name and its name speak of different components.
+
+        A note where only its long name speaks of the other: such texts are often copied from the neighbour.
+        """
+        if getattr(self.said, component) == name:
+            return ()
+        variable = self.data[name]
+        words = {"standard name": standard_name(variable), "name": name.lower()}
+        senses = {
+            what: "uv"[pair.index(word)]
+            for what, word in words.items()
+            for pair in (STANDARD_NAMES if what == "standard name" else SHORT_NAMES)
+            if word in pair
+        }
+        way = {"u": "toward east or along x", "v": "toward north or along y"}
+        told = ", ".join(f"its {what} {words[what]!r} is {way[sense]}" for what, sense in senses.items())
+        require(
+            len(set(senses.values())) < 2,
+            f"`{name}` in {self.name} contradicts itself: {told}; name `u` and `v` in `names` if you know "
+            "which is which",
+        )
+        long = str(variable.attrs.get("long_name", "")).lower().replace("_", " ")
+        others = [sense for sense, known in (("u", SENSE_OF_U), ("v", SENSE_OF_V)) if known.search(long)]
+        if len(others) != 1 or others[0] == component:
+            return ()
+        believed = f"its {next(iter(senses), 'name')} is believed"
+        return (f"the long name of `{name}`, {long!r}, speaks of the other component: {believed}",)
+
     def refuse(self) -> InputError:
         """Why a file without currents is none."""
         told = [f"`{n}`" for c in "uv" if (n := getattr(self.said, c)) is not None]
@@ -180,7 +269,7 @@ class Catalogue:
             standard = standard_name(variable)
             words = f"{name} {variable.attrs.get('long_name', '')}".lower()
             packed = "scale_factor" in variable.encoding
-            speed = in_metres_per_second(str(variable.attrs.get("units", ""))) is not None
+            speed = in_metres_per_second(units_of(variable)) is not None
             number = variable.dtype.kind == "f" or packed or (speed and variable.dtype.kind in "iu")
             flag = {"flag_values", "flag_masks", "flag_meanings"} & set(variable.attrs)
             if not number or variable.ndim < 2 or flag:
@@ -211,7 +300,7 @@ class Catalogue:
         for kind in WORDS:
             if getattr(self.said, kind) == name:
                 return kind
-        standard, units = standard_name(variable), str(variable.attrs.get("units", "")).strip()
+        standard, units = standard_name(variable), units_of(variable)
         if SIGMA.match(standard) or re.match(r"s_(rho|w)$", name):
             return "sigma"
         if standard.startswith(("grid_l", "projection_", "forecast_")):
@@ -219,15 +308,27 @@ class Catalogue:
         for cf, kind in CF_AXES.items():
             if name in self.data[[name]].set_coords(name).cf.coordinates.get(cf, []):
                 return kind
-        if " since " in units:
+        if SINCE.search(units):
             return "time"
         if str(variable.attrs.get("axis", "")).upper() == "Z":
             return "depth"
         if standard:
             return None
         hit = next((kind for kind, known in AXIS_NAMES.items() if name.lower() in known), None)
+        hit = self._plain_degrees(name, units) if hit is None else hit
         # a plane's own metres are no degrees
-        return None if hit in ("lon", "lat") and units.lower() in ("m", "km", "meters", "metres", "1") else hit
+        return None if hit in ("lon", "lat") and units.lower() in UNFIT_FOR_DEGREES else hit
+
+    def _plain_degrees(self, name: str, units: str) -> str | None:
+        """x and y that are degrees: by their long name, or in a grid that GMT made."""
+        variable = self.data[name]
+        if variable.ndim != 1 or name.lower() not in ("x", "y"):
+            return None
+        kind = {"x": "lon", "y": "lat"}[name.lower()]
+        long = str(variable.attrs.get("long_name", "")).lower()
+        told = WORDS[kind] in long and units.lower() in ("", "degrees", "degree", "deg")
+        made = not units and {"node_offset", "GMT_version"} & set(self.data.attrs)
+        return kind if told or made else None
 
     def axis_of(self, variable: Any, dim: str) -> tuple[str, str] | None:
         """Kind and name of the coordinate along a dimension, the dimension's own first."""

@@ -1,48 +1,137 @@
 """Opening ocean files, which are untrusted: NetCDF of either kind and Zarr, by xarray."""
 
 import json
+import re
+import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 from ...base.errors import InputError
 from ...base.settings import require
-from ...base.untrusted import check_claim, check_links
+from ...base.untrusted import check_claim, check_file, check_links, groups_of
 
+TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+"""How TIFF files begin."""
+OTHER_KINDS = {
+    b"GRIB": "a GRIB file: install cfgrib, or convert it with `cdo -f nc4 copy` or `grib_to_netcdf`",
+    **dict.fromkeys(TIFF, "a GeoTIFF: install rioxarray, or convert it with `gdal_translate -of netCDF`"),
+    b"PK\x03\x04": "a zip archive: unpack it with `unzip`, and name the file in it",
+    b"\x1f\x8b": "packed by gzip: unpack it with `gunzip`",
+    b"BZh": "packed by bzip2: unpack it with `bunzip2`",
+    b"\xfd7zXZ": "packed by xz: unpack it with `unxz`",
+    b"\x0e\x03\x13\x01": "an HDF4 file: convert it with `h4tonccf_nc4` or `gdal_translate -of netCDF`",
+    b"ncols": "an ESRI ASCII grid: convert it with `gdal_translate -of netCDF`",
+    b"NCOLS": "an ESRI ASCII grid: convert it with `gdal_translate -of netCDF`",
+    b"DSAA": "a Surfer grid: convert it with `gdal_translate -of netCDF`",
+}
+"""Files that are not read, by how they begin, and the tool that converts them."""
 MOST_STORE_FILES = 100_000
 """Files of a Zarr store that are looked at."""
 
 
+DECODERS = re.compile(
+    r"^(xarray\.(backends|coding|conventions)|h5netcdf|h5py|scipy\.io|zarr|numcodecs|cftime|netCDF4|cfgrib|eccodes|rasterio|rioxarray)\b"
+)
+"""Packages that read what a file holds: an error that comes out of them speaks of the file."""
+
+
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    """The xarray.Dataset of a file, times undecoded; InputError where it is none, or damaged."""
+def opened(path: Path, group: str | None = None) -> Iterator[Any]:
+    """The xarray.Dataset of a file, times undecoded; InputError where it is none, or damaged.
+
+    `group` of a NetCDF-4 file, where it has several; the only one that holds grids is taken without a word.
+    """
     _needs("xarray", path)
     _needs("cf_xarray", path)
     import cf_xarray  # noqa: F401  (registers the accessor)
     import xarray
 
     require(path.exists(), f"the file {path} does not exist")
-    engine = _engine(path)
-    with warnings.catch_warnings():
-        # stale attributes of good data: several fill values, odd calendars
+    check_file(path, "the file")
+    engine, more = _engine(path)
+    try:
+        if engine == "h5netcdf":
+            check_links(path)
+            more = {"group": _group(path, group)}
+        with warnings.catch_warnings():
+            # of the packages that read, and of stale attributes of good data: several fill values, odd calendars
+            warnings.simplefilter("ignore")
+            data = xarray.open_dataset(path, engine=engine, decode_times=False, cache=False, **more)
+    except InputError:
+        raise
+    except Exception as error:
+        # what a damaged file makes the libraries raise is not written down anywhere
+        raise _damaged(path, error) from None
+    with warnings.catch_warnings(), data:
         warnings.simplefilter("ignore", xarray.SerializationWarning)
         warnings.filterwarnings("ignore", category=RuntimeWarning, module=r"xarray|scipy")
         warnings.filterwarnings("ignore", module=r"zarr")
         try:
-            if engine == "h5netcdf":
-                check_links(path)
-            with xarray.open_dataset(path, engine=engine, decode_times=False, cache=False) as data:
-                _check_claims(path, data)
-                yield data
+            _check_claims(path, data)
+            yield _with_parents(path, data, more.get("group"))
         except InputError:
             raise
         except Exception as error:
-            # what a damaged file makes the libraries raise is not written down anywhere
-            what = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise InputError(f"{path.name} cannot be read; it may be truncated or damaged: {what}") from None
+            if _of_the_file(error):
+                raise _damaged(path, error) from None
+            raise
+
+
+def _damaged(path: Path, error: Exception) -> InputError:
+    what = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return InputError(f"{path.name} cannot be read; it may be truncated or damaged: {what}")
+
+
+def _of_the_file(error: Exception) -> bool:
+    """Whether an error came out of a decoder, rather than out of this package."""
+    if not isinstance(error.__traceback__, TracebackType):
+        return False
+    modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    last = max((n for n, name in enumerate(modules) if name.startswith("glider_stream")), default=-1)
+    return any(DECODERS.match(name) for name in modules[last + 1 :])
+
+
+def _group(path: Path, said: str | None) -> str | None:
+    """The group of a NetCDF-4 file that holds grids: the user's, the root, or the only one that does."""
+    every, grids = groups_of(path)
+    if said is not None:
+        wanted = said.strip("/")
+        known = ", ".join(every) or "none"
+        require(wanted in (*every, ""), f"{path.name} holds no group `{said}`; it holds: {known}")
+        return wanted or None
+    if not grids or "" in grids:
+        return None
+    require(
+        len(grids) == 1,
+        f"{path.name} holds grids in {len(grids)} groups, {', '.join(sorted(grids)[:6])}: name `group` in "
+        "`names`",
+    )
+    return grids.pop()
+
+
+def _with_parents(path: Path, data: Any, group: str | None) -> Any:
+    """The data of a group, and the axes that it takes from the groups around it."""
+    import xarray
+
+    while group:
+        group = group.rpartition("/")[0]
+        with xarray.open_dataset(
+            path, engine="h5netcdf", decode_times=False, cache=False, group=group or None
+        ) as around:
+            _check_claims(path, around)
+            missing = {
+                name: variable.load()
+                for name, variable in around.variables.items()
+                if name not in data.variables
+                and all(data.sizes.get(dim, n) == n for dim, n in variable.sizes.items())
+            }
+            data = data.assign(missing)
+    return data
 
 
 def _needs(module: str, path: Path) -> None:
@@ -51,13 +140,15 @@ def _needs(module: str, path: Path) -> None:
     require(found, f"reading {path.name} needs {name}, which is missing: pip install glider-stream[ocean]")
 
 
-def _engine(path: Path) -> str:
+def _engine(path: Path) -> tuple[str, dict[str, Any]]:
+    """What opens a file, and what it is told; InputError names the tool that converts what is not read."""
     if path.is_dir():
         store = any((path / name).is_file() for name in ("zarr.json", ".zgroup", ".zmetadata"))
         require(store, f"{path} is a folder and no Zarr store; name the NetCDF file in it")
         _needs("zarr", path)
         _check_store(path)
-        return "zarr"
+        # told, it neither guesses nor warns
+        return "zarr", {"consolidated": _is_consolidated(path)}
     try:
         with path.open("rb") as stream:
             head = stream.read(2056)
@@ -66,15 +157,31 @@ def _engine(path: Path) -> str:
     require(head[:4] != b"CDF\x05", f"{path.name} is a NetCDF-5 file: rewrite it with `nccopy -k nc4`")
     if any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048)):
         _needs("h5netcdf", path)
-        return "h5netcdf"
-    require(head[:4] in (b"CDF\x01", b"CDF\x02"), f"{path.name} is not a NetCDF file, whatever its name")
-    return "scipy"
+        return "h5netcdf", {}
+    if head[:4] in (b"CDF\x01", b"CDF\x02"):
+        return "scipy", {}
+    if head[:4] == b"GRIB" and find_spec("cfgrib") is not None:
+        return "cfgrib", {"backend_kwargs": {"indexpath": ""}}
+    if head[:4] in TIFF and find_spec("rioxarray") is not None:
+        return "rasterio", {}
+    for mark, what in OTHER_KINDS.items():
+        require(not head.startswith(mark), f"{path.name} is {what}")
+    raise InputError(f"{path.name} is not a NetCDF file, whatever its name")
+
+
+def _is_consolidated(path: Path) -> bool:
+    """Whether a Zarr store keeps what it holds in one place."""
+    if (path / ".zmetadata").is_file():
+        return True
+    whole = path / "zarr.json"
+    return whole.is_file() and "consolidated_metadata" in json.loads(whole.read_text(encoding="utf-8"))
 
 
 def _check_store(path: Path) -> None:
     """A Zarr store names its codecs; one that unpickles runs whatever it holds."""
     for count, file in enumerate(path.rglob("*")):
         require(count < MOST_STORE_FILES, f"{path} holds more than {MOST_STORE_FILES:,} files; cut the store")
+        check_file(file, f"in {path}, ")
         if file.name not in ("zarr.json", ".zarray", ".zmetadata"):
             continue
         try:
@@ -89,4 +196,6 @@ def _check_claims(path: Path, data: Any) -> None:
     """Refuse what no file of its size can hold, before room is made for it."""
     held = sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) if path.is_dir() else path.stat().st_size
     for name, variable in data.variables.items():
+        if path.is_dir() and (path / str(name)).is_dir():
+            held = sum(part.stat().st_size for part in (path / str(name)).rglob("*") if part.is_file())
         check_claim(path.name, f"`{name}`", variable.shape, variable.dtype.itemsize, held)

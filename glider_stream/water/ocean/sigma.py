@@ -16,6 +16,8 @@ Values = NDArray[np.float32]
 FINER = 2
 """Levels of fixed depth for each terrain-following one: interpolating twice must not blur."""
 SAME = 1e-6
+THIN = 0.1
+"""A single level this near the surface or the seabed, as a share of the depth, is the outermost layer."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class SigmaLevels:
     The three forms of CF Appendix D. `stretch` C and `at` s (levels): ocean_s_coordinate_g1:
     S = hc s + (h - hc) C, z = S + zeta (1 + S / h). _g2: S = (hc s + h C) / (hc + h), z = zeta + (zeta + h) S.
     ocean_sigma_coordinate: z = zeta + s (zeta + h).
+    `low`, `high`: s and C where the layers that the file holds begin and end, -1 and 0 of a whole column.
     """
 
     form: str
@@ -35,10 +38,31 @@ class SigmaLevels:
     depth: Any
     surface: Any | None
     words: str
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    @property
+    def whole(self) -> bool:
+        """Whether the levels are those of the whole column."""
+        return self.low[0] == -1.0 and self.high[0] == 0.0
 
     def heights(self, h: Array, zeta: Array | float) -> Array:
         """Heights of all levels over points of depth `h` (ny, nx): (levels, ny, nx)."""
-        s, c = self.at[:, None, None], self.stretch[:, None, None]
+        return self._heights(self.at, self.stretch, h, zeta)
+
+    def ends(self, h: Array, zeta: Array | float) -> Array:
+        """Heights (2, ny, nx) [m] between which there are data: the outermost levels, half a layer further."""
+        s, c = (np.array([low, high]) for low, high in zip(self.low, self.high, strict=True))
+        found = self._heights(s, c, h, zeta)
+        if self.low[0] == -1.0:
+            found[0] = -np.inf
+        if self.high[0] == 0.0:
+            # under an ebb, too, the first level is that of the surface
+            found[1] = np.inf
+        return found
+
+    def _heights(self, at: Array, stretch: Array, h: Array, zeta: Array | float) -> Array:
+        s, c = at[:, None, None], stretch[:, None, None]
         if self.form == "sigma":
             return np.asarray(zeta + s * (zeta + h))
         if self.form == "g1":
@@ -48,17 +72,17 @@ class SigmaLevels:
         return np.asarray(zeta + (zeta + h) * S)
 
 
+def _coordinate(data: Any, dim: str, variable: Any) -> Any | None:
+    """The values of s along the levels: by their standard name, under the dimension's name, or CROCO's."""
+    for name in map(str, data.variables):
+        if data[name].dims == (dim,) and SIGMA.match(standard_name(data[name])):
+            return data[name]
+    return data[dim] if dim in data.variables else _among_attributes(data, dim, variable, "sc_r")
+
+
 def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     """What a file says of the terrain-following levels of a variable; InputError names what is missing."""
-    coordinate = next(
-        (
-            data[n]
-            for n in map(str, data.variables)
-            if data[n].dims == (dim,) and SIGMA.match(standard_name(data[n]))
-        ),
-        None,
-    )
-    coordinate = data[dim] if coordinate is None and dim in data.variables else coordinate
+    coordinate = _coordinate(data, dim, variable)
     broken = f"`{variable.name}` in {name} is on terrain-following levels `{dim}`"
     if coordinate is None:
         raise InputError(f"{broken} without values of its own; add the file that holds them")
@@ -73,6 +97,9 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
         if one is not None and one.size == 1:
             return float(one.values.ravel()[0])
         said = next((data.attrs[n] for n in usual if n in data.attrs), None)
+        if isinstance(said, str):
+            # CROCO says so in a word
+            return {"NEW": 2.0, "OLD": 1.0}.get(said.strip().upper())
         return None if said is None else float(np.ravel(said)[0])
 
     standard = standard_name(coordinate)
@@ -84,7 +111,8 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     words = f"{dim}: terrain-following levels over `{h.name}`"
     words += " under a level surface" if zeta is None else f" under `{zeta.name}`"
     if standard == "ocean_sigma_coordinate":
-        return SigmaLevels("sigma", dim, s, s, 0.0, h, zeta, words)
+        low, high = _ends(name, variable, s, s)
+        return SigmaLevels("sigma", dim, s, s, 0.0, h, zeta, _told(words, low, high), low, high)
     transform = number("", "Vtransform", "vtransform", "VertCoordType")
     if standard not in ("ocean_s_coordinate_g1", "ocean_s_coordinate_g2"):
         if standard and standard != "ocean_s_coordinate":
@@ -94,14 +122,58 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
         if transform not in (1.0, 2.0):
             raise InputError(f"{broken}, but the file has no `Vtransform` of 1 or 2; add the grid file that does")
         standard = f"ocean_s_coordinate_g{int(transform)}"
+    require(
+        transform in (None, float(standard[-1])),
+        f"{broken} of the form {standard!r}, but the file says `Vtransform` = {transform}: mend one of them",
+    )
     stretch, critical = term("C", "Cs_r", "Cs_rho"), number("depth_c", "hc", "Tcline")
+    stretch = _among_attributes(data, dim, variable, "Cs_r") if stretch is None else stretch
     lacks = [what for what, one in (("Cs_r", stretch), ("hc", critical)) if one is None]
     require(not lacks, f"{broken}, but the file holds no {listing(lacks)}; add the grid file that does")
     assert stretch is not None
     assert critical is not None
     c = np.asarray(stretch.values, np.float64)
     require(c.shape == s.shape, f"{broken}, but `{stretch.name}` has {c.size} values for {s.size} levels")
-    return SigmaLevels(standard[-2:], dim, s, c, critical, h, zeta, words)
+    low, high = _ends(name, variable, s, c)
+    return SigmaLevels(standard[-2:], dim, s, c, critical, h, zeta, _told(words, low, high), low, high)
+
+
+def _told(words: str, low: tuple[float, float], high: tuple[float, float]) -> str:
+    kept = "" if (low[0], high[0]) == (-1.0, 0.0) else f", those from s = {low[0]:.3g} to {high[0]:.3g} only"
+    return words + kept
+
+
+def _among_attributes(data: Any, dim: str, variable: Any, name: str) -> Any | None:
+    """Values along the levels that CROCO writes as an attribute of the file."""
+    import xarray
+
+    values = np.ravel(data.attrs.get(name, []))
+    if values.size != variable.sizes[dim] or values.dtype.kind not in "fi":
+        return None
+    return xarray.DataArray(values.astype(np.float64), dims=(dim,), name=name)
+
+
+def _ends(name: str, variable: Any, s: Array, c: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """s and C where the outermost layers end: half a layer beyond their levels, -1 and 0 of a whole column."""
+    order = np.argsort(s)
+    at, stretch = s[order], c[order]
+    if at.size == 1:
+        # nothing says how thick it is: the uppermost or the lowest layer of many, or none that can be told
+        half = min(-at[0], 1 + at[0])
+        require(
+            half <= THIN,
+            f"`{variable.name}` in {name} has one terrain-following level, at s = {at[0]:.3g}, amid the water: "
+            "nothing says for which depths it holds; cut the file with more levels",
+        )
+        return (
+            ((-1.0, -1.0), (2 * half - 1, 2 * half - 1))
+            if at[0] < -0.5
+            else ((-2 * half, 2 * stretch[0]), (0.0, 0.0))
+        )
+    low = at[0] - (at[1] - at[0]) / 2, stretch[0] - (stretch[1] - stretch[0]) / 2
+    high = at[-1] + (at[-1] - at[-2]) / 2, stretch[-1] + (stretch[-1] - stretch[-2]) / 2
+    near = 0.25 * (at[1] - at[0]), 0.25 * (at[-1] - at[-2])
+    return ((-1.0, -1.0) if low[0] <= -1 + near[0] else low, (0.0, 0.0) if high[0] >= -near[1] else high)
 
 
 def fixed_depths(levels: SigmaLevels, h: Array) -> Array:
@@ -110,8 +182,10 @@ def fixed_depths(levels: SigmaLevels, h: Array) -> Array:
     require(bool(known.any()), f"the depth of the seabed `{levels.depth.name}` is nowhere above 0")
     parts = []
     for deep in np.unique(np.quantile(h[known], [0.02, 0.5, 1.0])):
-        own = np.sort(-levels.heights(np.full((1, 1), deep), 0.0).ravel())
-        edges = np.concatenate([[0.0], np.clip(own, 0.0, deep), [deep]])
+        column = np.full((1, 1), deep)
+        last, first = np.clip(-levels.ends(column, 0.0).ravel(), 0.0, deep)
+        own = np.clip(np.sort(-levels.heights(column, 0.0).ravel()), first, last)
+        edges = np.concatenate([[first], own, [last]])
         parts.append(np.interp(np.linspace(0, 1, FINER * edges.size), np.linspace(0, 1, edges.size), edges))
     every = np.unique(np.concatenate(parts))
     # levels closer than a hundredth of their depth, or 10 cm, say the same
@@ -123,10 +197,11 @@ def fixed_depths(levels: SigmaLevels, h: Array) -> Array:
     return np.array(kept)
 
 
-def to_fixed(values: Values, heights: Array, h: Array, depths: Array) -> Values:
+def to_fixed(values: Values, heights: Array, h: Array, depths: Array, ends: Array) -> Values:
     """Values (levels, ny, nx) at `heights` [m] on fixed `depths` (nz, ny, nx): linear between levels.
 
-    Held above the highest and below the lowest level; NaN under the seabed at `h`.
+    Held above the highest and below the lowest level as far as `ends` (2, ny, nx) [m]; NaN beyond, and under
+    the seabed at `h`.
     """
     order = (
         slice(None) if heights.shape[0] < 2 or np.nanmean(np.diff(heights, axis=0)) > 0 else slice(None, None, -1)
@@ -142,5 +217,6 @@ def to_fixed(values: Values, heights: Array, h: Array, depths: Array) -> Values:
         low, high = (np.take_along_axis(known, n, axis=0)[0] for n in (below, above))
         gap = upper - lower
         weight = np.clip((z - lower) / np.where(gap > 0, gap, 1.0), 0.0, 1.0)
-        result[k] = np.where(depth <= h + SAME, low * (1 - weight) + high * weight, np.nan)
+        held = (depth <= h + SAME) & (z >= ends[0] - SAME) & (z <= ends[1] + SAME)
+        result[k] = np.where(held, low * (1 - weight) + high * weight, np.nan)
     return result

@@ -13,12 +13,38 @@ def in_metres(units: str) -> float | None:
     return METRES.get(text if len(text) < 3 else text.removesuffix("s"))
 
 
+HOURS = {
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "min": 60.0,
+    "minute": 60.0,
+    "h": 3600.0,
+    "hr": 3600.0,
+    "hour": 3600.0,
+}
+HOURS |= {"d": 86400.0, "day": 86400.0}
+"""Seconds of units of time."""
+SIGNS = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "·": " ", "⋅": " ", "×": " ", "{": "", "}": "", "$": ""})
+
+
+def in_seconds(units: str) -> float | None:
+    """Seconds of one such unit; None where it is no time."""
+    text = units.strip().lower()
+    return HOURS.get(text, HOURS.get(text.removesuffix("s")))
+
+
 def in_metres_per_second(units: str) -> float | None:
     """m/s of one such unit; None where it is no speed."""
-    text = re.sub(r"\s+", " ", units.strip().lower())
+    text = re.sub(r"\s+", " ", units.translate(SIGNS).strip().lower())
     if text in KNOTS:
         return 1852 / 3600
     text = text.replace(" ^", "^").replace("^-1", "-1").replace("**-1", "-1").replace(" / ", "/")
-    match = re.fullmatch(r"([a-z]+?)s?\s*(/|per)\s*(s|sec|secs|second|seconds)\.?", text)
+    match = re.fullmatch(r"([a-z]+?)s?\s*(?:/|per)\s*([a-z]+)\.?", text)
+    match = match or re.fullmatch(r"([a-z]+?)s?[\s.*_]+([a-z]+?)\s*-1", text)
+    match = match or re.fullmatch(r"(k?m|cm|mm)(s|h)-1", text)
     match = match or re.fullmatch(r"([a-z]+?)s?[\s.*_]*(s|sec|secs|second|seconds)\s*-1", text)
-    return METRES.get(match.group(1)) if match and match.group(1) else None
+    if match is None or not match.group(1):
+        return None
+    length, time = METRES.get(match.group(1)), in_seconds(match.group(2))
+    return None if length is None or time is None else length / time

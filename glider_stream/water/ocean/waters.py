@@ -28,5 +28,5 @@ class OceanFlow:
         """Flow and bottom of a domain, and a word on where they come from."""
         file = read_currents(self.file, self.names, lon=lon, lat=lat, depth=depth)
         flow, bottom = ocean_waters(file, frame, lon, lat, depth, self.epoch)
-        words = [f"{file.took['u']}, {file.took['v']} of {file.name}", file.time_range, *file.notes]
+        words = [f"{file.took['u']}, {file.took['v']} of {file.name}", file.time_range, *file.words, *file.notes]
         return flow, bottom, "; ".join(words)

@@ -1,0 +1,146 @@
+"""Expansion: the legs that leave a place, found when a search comes to it."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..base.arrays import Array, Bools, Index
+from ..kernels.edges import EDGE_COLUMNS, STATUS, TIME, Status
+from ..roadmap.problem import Problem
+
+
+class Fan(NamedTuple):
+    """Legs that leave one place at one time: to the places `target` (n,), rising; rows of `Edge` (n, 7)."""
+
+    target: Index
+    rows: Array
+
+
+class Expansion(Protocol):
+    """Where legs come from; places are the nodes, then the goals that are none, then a start that is none."""
+
+    @property
+    def places(self) -> Array:
+        """Of all places (n, 3) [m]."""
+        ...
+
+    @property
+    def nodes(self) -> int:
+        """How many of the places are nodes, the first ones."""
+        ...
+
+    @property
+    def start(self) -> int:
+        """The place of the start."""
+        ...
+
+    def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
+        """The legs from some places, none twice, left at some times [s]; to others than those `wanted` or not.
+
+        `place` (n,), `time` (n,), `wanted` (n, places).
+        """
+        ...
+
+
+class Ends(NamedTuple):
+    """The ends of a search: of the start and each goal, where it is (3,) [m] and the nodes there, often none."""
+
+    start: Array
+    start_nodes: Index
+    goals: Sequence[Array]
+    goal_nodes: Sequence[Index]
+
+
+class ClockExpansion:
+    """Legs as they are at the time at which they begin; with `frozen`, all as at the problem's departure.
+
+    No leg ends after the flow does; `cut` says whether any leg looked for might have.
+    """
+
+    def __init__(self, problem: Problem, position: Array, ends: Ends, frozen: bool) -> None:
+        """Number the places; find from which nodes legs to a goal may come."""
+        self.problem, self.position, self.ends, self.frozen = problem, position, ends, frozen
+        self.legs = problem.legs(position)
+        self.new_goals = [n for n, nodes in enumerate(ends.goal_nodes) if not nodes.size]
+        beside = [ends.goals[n] for n in self.new_goals]
+        apart = [] if ends.start_nodes.size else [ends.start]
+        self._places = np.vstack([position, *beside, *apart])
+        self._may_end = np.zeros((len(position), len(beside)), bool)
+        for n, goal in enumerate(beside):
+            self._may_end[self.legs.before(goal), n] = True
+        self.cut = False
+
+    @property
+    def places(self) -> Array:
+        """As Expansion says."""
+        return self._places
+
+    @property
+    def nodes(self) -> int:
+        """As Expansion says."""
+        return len(self.position)
+
+    @property
+    def start(self) -> int:
+        """As Expansion says."""
+        nodes = self.ends.start_nodes
+        return int(nodes[0]) if nodes.size else len(self._places) - 1
+
+    @property
+    def goals(self) -> list[Index]:
+        """The places of each goal."""
+        first = len(self.position)
+        return [
+            nodes if nodes.size else np.array([first + self.new_goals.index(n)])
+            for n, nodes in enumerate(self.ends.goal_nodes)
+        ]
+
+    def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
+        """As Expansion says."""
+        nodes, flow = len(self.position), self.problem.evaluator.flow
+        when = np.full(time.size, self.problem.departure) if self.frozen else time
+        integration = self.problem.evaluator.integration
+        self.cut |= bool(when.max() + integration.dt * integration.steps > flow.extent.t_hi)
+        result = [Fan(np.empty(0, np.int64), np.empty((0, EDGE_COLUMNS)))] * place.size
+        asked = np.flatnonzero(place < nodes)
+        if asked.size:
+            found = self.legs.of(place[asked], when[asked], wanted[asked, :nodes])
+            for n, first, last in zip(asked, found.indptr, found.indptr[1:], strict=False):
+                result[n] = Fan(found.target[first:last], found.outcomes[first:last])
+        if place.max() >= nodes:
+            away = self.legs.away(self.ends.start, float(when[int(np.argmax(place))]))
+            result[int(np.argmax(place))] = Fan(away.nodes, away.outcomes)
+        self._to_goals(place, when, wanted, result)
+        return [_kept(fan, float(t), flow.extent.t_hi) for fan, t in zip(result, when, strict=True)]
+
+    def _to_goals(self, place: Index, when: Array, wanted: Bools, result: list[Fan]) -> None:
+        """Add the legs to the goals that are no nodes, and from a start that is none to all."""
+        nodes, goals = len(self.position), np.array([int(one[0]) for one in self.goals], np.int64)
+        if not goals.size:
+            return
+        beside, column = goals >= nodes, np.maximum(goals - nodes, 0)
+        ask = np.zeros((place.size, goals.size), bool)
+        for n, at in enumerate(place):
+            if at == self.start:
+                ask[n] = beside | bool(at >= nodes)
+            elif at < nodes and self._may_end.shape[1]:
+                ask[n] = beside & self._may_end[at, column]
+        ask &= wanted[:, goals]
+        if not ask.any():
+            return
+        points = np.vstack([self._places[place], self._places[goals]])
+        indptr = np.concatenate([[0], np.cumsum(ask.sum(axis=1))])
+        departs = np.concatenate([when, np.zeros(goals.size)])
+        to = np.nonzero(ask)[1]
+        rows = self.problem.evaluator.connect(points, departs, np.arange(place.size), indptr, place.size + to)
+        for n in map(int, np.flatnonzero(ask.any(axis=1))):
+            here, new = result[n], slice(indptr[n], indptr[n + 1])
+            result[n] = Fan(np.concatenate([here.target, goals[to[new]]]), np.concatenate([here.rows, rows[new]]))
+
+
+def _kept(fan: Fan, departure: float, last: float) -> Fan:
+    """Those that connect, and arrive before the flow ends."""
+    with np.errstate(invalid="ignore"):
+        fits = (fan.rows[:, STATUS] == Status.CONNECTED) & (departure + fan.rows[:, TIME] <= last)
+    return Fan(fan.target[fits], fan.rows[fits])

@@ -1,0 +1,213 @@
+"""The clock runs: queries in which every leg leaves when the last one arrives.
+
+A node is expanded by its legs at the time at which it is reached, so that what is found flies from end to end in
+the flow as it changes. That needs no roadmap, only nodes.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import timedelta
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import Array
+from ..base.clock import moment
+from ..base.settings import require
+from ..kernels.edges import TIME
+from ..roadmap.problem import Problem
+from ..roadmap.step_error import step_error
+from .assembly import RoutePlanner, nodes_at, placed_end
+from .expansion import ClockExpansion, Ends
+from .labels import Aim, LabelSearch
+from .least_time import GreatestSpeeds, LeastTimes
+from .path import Path
+from .surfacing import Surfacing
+from .trade_off import TradeOff, none_within
+from .why_not import why_not
+
+MOST_BINS, FEWER_BINS = 240, 48
+"""How many bins of time after departure a search with bins looks at; and one that was not asked to use them."""
+
+
+class ClockPlanner(RoutePlanner):
+    """Answers queries among nodes (n, 3) [m] by legs found when they are needed; any number, at any departure.
+
+    As `query.Planner`, which it stands in for wherever the flow changes. A `rule` of surfacing holds with the
+    clock running. With `frozen` every leg meets the current of the problem's departure.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        position: Array,
+        rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
+        frozen: bool = False,
+    ) -> None:
+        """Nothing is looked for yet."""
+        super().__init__(problem, rule, frozen)
+        self.position = position
+        self._speeds: dict[float, GreatestSpeeds] = {}
+
+    def query(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+    ) -> Path:
+        """The cheapest path between two points (3,) [m]; the scenario's own start and goal where None."""
+        return self._query(start, goal, Aim(by_cost=True))
+
+    def leaving(self, since: float) -> "ClockPlanner":
+        """The same planner for routes that leave `since` [s] later."""
+        problem = self.problem
+        departs = None if problem.departs is None else problem.departs + timedelta(seconds=since)
+        moved = replace(problem, departure=problem.departure + since, departs=departs)
+        later = ClockPlanner(moved, self.position, self.rule, self.assembly.frozen)
+        later._speeds = self._speeds
+        return later
+
+    def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
+        """The fastest path that costs no more than so much; where there is none, why."""
+        aim = Aim(cost_below=float(np.nextafter(most_cost, math.inf)))
+        path = self._query(start, goal, aim)
+        return path if path.found else none_within(self.query(start, goal), most_cost)
+
+    def _query(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim) -> Path:
+        ends = self._ends(start, [goal])
+        if np.array_equal(ends.start, ends.goals[0]):
+            return self.assembly.path(ends.start, ends.goals[0], [])
+        path, search = self._first(ends, self._with_bins(aim))
+        if path.found:
+            return path
+        if self.problem.bins is not None:
+            return self._first(ends, aim)[0]
+        # a glider that cannot hold its place comes back to a node later, and only then finds a way on
+        durations = [float(label.row[TIME]) for label in search.labels if label.row is not None]
+        if not durations or not self.assembly.changes or self.assembly.frozen:
+            return path
+        bins = float(np.median(durations))
+        latest = self.problem.departure + FEWER_BINS * bins
+        again, _ = self._first(ends, replace(aim, bins=bins, latest=latest))
+        until = moment(self.problem.departs, FEWER_BINS * bins)
+        looked = f"ways that come back to a node later were followed until {until}, in bins of {bins:,.0f} s"
+        return again if again.found else replace(path, why=f"{path.why}; {looked}")
+
+    def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
+        """The cheapest paths from a point (3,) [m] to each of many, by one search."""
+        if len(goals) == 1:
+            return [self.query(start, goals[0])]
+        ends = self._ends(start, goals)
+        search, expansion = self._search(ends, Aim(by_cost=True), to_all=True)
+        goal_of: dict[int, list[int]] = {}
+        for n, places in enumerate(expansion.goals):
+            for place in places:
+                goal_of.setdefault(int(place), []).append(n)
+        first: dict[int, int] = {}
+        for number in search.settled():
+            for n in goal_of.get(search.labels[number].place, ()):
+                first.setdefault(n, number)
+            if len(first) == len(goals):
+                break
+        return [self._path(search, expansion, first.get(n), ends, n) for n in range(len(goals))]
+
+    def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
+        """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
+        return np.array([[path.cost for path in self.queries(start, goals)] for start in starts]).reshape(
+            len(starts), len(goals)
+        )
+
+    def arrivals(self, start: ArrayLike | None = None) -> Array:
+        """When each node (n,) can be reached from a point at the soonest [s since departure]; inf where not."""
+        departure, times = self.problem.departure, np.full(len(self.position), math.inf)
+        search, _ = self._search(self._ends(start, []), Aim(), to_all=True)
+        for number in search.settled():
+            label = search.labels[number]
+            if label.place < times.size:
+                times[label.place] = min(times[label.place], label.time - departure)
+        return times
+
+    def front(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> TradeOff:
+        """Every path that no other beats both in time and in energy, by rising time."""
+        ends = self._ends(start, [goal])
+        search, expansion = self._search(ends, self._with_bins(Aim(front=True)))
+        found: list[int | None] = [n for n in search.settled() if search.is_goal[search.labels[n].place]]
+        paths = [self._path(search, expansion, number, ends, 0) for number in found or [None]]
+        return TradeOff(tuple(paths))
+
+    def _ends(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> Ends:
+        """Where the ends of a query are, checked."""
+        begin = placed_end(self.problem, start, self.problem.start, "start")
+        places = [placed_end(self.problem, goal, self.problem.goal, "goal") for goal in goals]
+        for place, name in [(begin, "start"), *((place, "goal") for place in places)]:
+            self.rule.check_end(place, name)
+        return Ends(begin, nodes_at(self.position, begin), places, [nodes_at(self.position, p) for p in places])
+
+    def _with_bins(self, aim: Aim) -> Aim:
+        bins = self.problem.bins
+        return aim if bins is None else replace(aim, bins=bins, latest=self.problem.departure + MOST_BINS * bins)
+
+    def _search(self, ends: Ends, aim: Aim, to_all: bool = False) -> tuple[LabelSearch, ClockExpansion]:
+        departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
+        times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
+        within = extent.t_lo <= departure <= extent.t_hi
+        require(within, f"the departure at {departure:g} s lies outside {times}; choose one of them")
+        expansion = ClockExpansion(self.problem, self.position, ends, self.assembly.frozen)
+        goals = np.empty(0, np.int64) if to_all else expansion.goals[0]
+        least = LeastTimes(self._speeds_now(), expansion.places)
+        cost = self.problem.evaluator.cost
+        return LabelSearch(expansion, cost, self.rule, least, goals, departure, aim), expansion
+
+    def _speeds_now(self) -> GreatestSpeeds:
+        """The greatest speeds from the departure on; those from an earlier time on bound them, too."""
+        departure = self.problem.departure
+        since = max((begin for begin in self._speeds if begin <= departure), default=departure)
+        if since not in self._speeds:
+            self._speeds[since] = GreatestSpeeds(self.problem, self.position, since)
+        return self._speeds[since]
+
+    def _first(self, ends: Ends, aim: Aim) -> tuple[Path, LabelSearch]:
+        """The path of the first label that settles at the goal."""
+        search, expansion = self._search(ends, aim)
+        settled = (number for number in search.settled() if search.is_goal[search.labels[number].place])
+        return self._path(search, expansion, next(settled, None), ends, 0), search
+
+    def _path(
+        self,
+        search: LabelSearch,
+        expansion: ClockExpansion,
+        number: int | None,
+        ends: Ends,
+        goal: int,
+    ) -> Path:
+        here = np.array_equal(ends.start, ends.goals[goal])
+        if number is None and not here:
+            return self._no_path(expansion, search, ends.start, ends.goals[goal])
+        hops = [] if number is None or here else search.hops(number)
+        if hops:
+            starts, values = np.array([hop[0] for hop in hops]), np.array([hop[2][1:] for hop in hops])
+            step_error(self.problem, starts, values).check()
+        path = self.assembly.path(ends.start, ends.goals[goal], hops)
+        return replace(path, expanded=search.tally.share)
+
+    def _no_path(self, expansion: ClockExpansion, search: LabelSearch, start: Array, goal: Array) -> Path:
+        """The honest no, and why, as far as that is known."""
+        problem, extent = self.problem, self.problem.evaluator.flow.extent
+        departure, times = problem.departure, np.full(expansion.nodes, math.inf)
+        for label in search.labels:
+            if label.place < expansion.nodes:
+                times[label.place] = min(times[label.place], label.time - departure)
+        path = self.assembly.no_path(start, goal)
+        if not expansion.nodes:
+            return path
+        clock = self.assembly.changes and not self.assembly.frozen
+        reason = why_not(problem, self.position, times, start, goal, clock)
+        why = str(reason)
+        if expansion.cut and clock:
+            ends = moment(problem.departs, extent.t_hi - departure)
+            ends = ends if problem.departs is not None else f"{extent.t_hi:,.0f} s"
+            why = (
+                f"the currents' times end at {ends}, and no way that was found gets there before; leave earlier, "
+                f"or take currents that reach further; else {why}"
+            )
+        return replace(path, why=why, why_not=reason.as_dict(), expanded=search.tally.share)

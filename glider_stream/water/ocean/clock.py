@@ -1,0 +1,289 @@
+"""Times of ocean files in UTC: instants or means, runs with lead times, files that do not say when they are."""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...base.settings import require
+from .file import Times, parse_time
+from .names import SINCE, Catalogue, Names, standard_name, units_of
+from .units import in_seconds
+
+REFERENCE = re.compile(
+    r"^(forecast_)?(reference_time|reftime)$|^(run|run_time|init|init_time|analysis_time)$", re.I
+)
+"""Names of the time at which a forecast begins."""
+LEAD = re.compile(
+    r"^(step|lead|lead_time|leadtime|forecast_period|forecast_hour|fhour|tau|prediction_timedelta)$", re.I
+)
+"""Names of the time since then."""
+MEAN_TITLES = re.compile(
+    r"\b(daily|hourly|monthly|weekly|annual|yearly|time|\d+.?(day|hour|month)\w*)[\s_-]*(mean|average)"
+    r"|\baverages? file|(mean|average)s? (of|over) (one|a|each|\d)|(?<![A-Za-z])P(1D|1M|T\d+H)-m\b|\bday_mean\b"
+    r"|\b(mean|average)d? fields?",
+    re.I,
+)
+"""Titles and products that speak of means over time."""
+TITLES = (
+    "title",
+    "id",
+    "product",
+    "product_id",
+    "dataset",
+    "dataset_id",
+    "type",
+    "field_type",
+    "summary",
+    "source",
+)
+MEAN_WORDS = ("mean", "average", "averaged", "avg")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """`times` (nt) UTC in the order of the file, None where it does not say; `dims` along which they lie.
+
+    `picked`: places along other dimensions that the user chose. `words`: what was taken for what; `stamps`:
+    whether values are means, and where in their interval the file's times stand.
+    """
+
+    times: Times | None
+    dims: tuple[str, ...]
+    picked: dict[str, int]
+    words: str
+    stamps: str
+    notes: tuple[str, ...]
+
+
+NO_CLOCK = Clock(None, (), {}, "", "instants: the file has no time", ())
+
+
+def clock_of(at: Catalogue, variable: Any, own: tuple[str, str] | None) -> Clock:
+    """The times of a variable, whose dimension and coordinate of time are `own`, if it has such."""
+    forecast = _forecast(at, variable)
+    if forecast is not None:
+        return forecast
+    name = own[1] if own is not None else at.scalar(variable, "time")
+    if name is None:
+        return NO_CLOCK
+    dims = () if own is None else (own[0],)
+    count, more = _decoded(at, at.data[name], at.said)
+    if count is None:
+        return Clock(None, dims, {}, name, "instants: nothing says when", more)
+    count, stamps, notes = _middles(at, variable, name, count)
+    return Clock(count, dims, {}, name, stamps, more + notes)
+
+
+def _rounded(values: NDArray[Any]) -> Times:
+    return (values.astype("datetime64[us]") + np.timedelta64(500, "us")).astype("datetime64[ms]")
+
+
+def _units(variable: Any, said: Names) -> str:
+    """The unit of a time, with the origin that the user gives where the file gives none."""
+    units = units_of(variable)
+    if SINCE.search(units) or said.origin is None:
+        return units
+    origin = str(parse_time(said.origin, "`origin`").astype("datetime64[s]")).replace("T", " ")
+    alone = re.sub(r"\bsince\b.*", "", units).strip()
+    require(
+        in_seconds(alone) is not None,
+        f"the time `{variable.name}` is in {alone!r}, which is no unit of time that can count from an origin",
+    )
+    return f"{alone} since {origin}"
+
+
+def _decoded(
+    at: Catalogue, variable: Any, said: Names, units: str | None = None
+) -> tuple[Times | None, tuple[str, ...]]:
+    """UTC, or None for a single time that does not say when; notes."""
+    import xarray
+
+    broken = f"the time `{variable.name}` in {at.name}"
+    units = units or _units(variable, said)
+    if not SINCE.search(units):
+        require(
+            variable.size == 1,
+            f'{broken} has no unit such as "hours since 1950-01-01" (it has {units or "none"!r}), so '
+            f"{variable.size} times are unknown: name `origin` in `names`, the date from which they count",
+        )
+        return None, (f"`{variable.name}` does not say when it is",)
+    raw = np.atleast_1d(np.asarray(variable.values))
+    require(raw.dtype.kind in "fiu" and bool(np.isfinite(raw).all()), f"{broken} has missing values")
+    calendar = str(variable.attrs.get("calendar", "standard"))
+    try:
+        # alone: other coordinates of the file, which cannot be decoded, must not be dragged along
+        bare = xarray.Dataset({"time": (tuple("abc"[: raw.ndim]), raw, {"units": units, "calendar": calendar})})
+        values = np.asarray(xarray.decode_cf(bare)["time"].values)
+    except Exception as error:
+        # what an impossible unit makes the libraries raise is not written down anywhere
+        raise InputError(
+            f"{broken} cannot be read: units {units!r}, calendar {calendar!r} ({str(error).splitlines()[0]})"
+        ) from None
+    notes: tuple[str, ...] = ()
+    if values.dtype.kind == "O":
+        try:
+            # by its label: 1 March stays 1 March, whatever February was
+            flat = [np.datetime64(one.isoformat(), "us") for one in values.ravel()]
+            values = np.array(flat).reshape(values.shape)
+        except ValueError:
+            raise InputError(f"{broken} has dates of the calendar {calendar!r} that do not exist") from None
+        notes = (f"times of the calendar {calendar!r} keep their dates",)
+    return _rounded(values), notes
+
+
+def _over_time(variable: Any, clock: str) -> str:
+    """How `cell_methods` says that values stand for their time: mean, point, ..., or nothing."""
+    methods = str(variable.attrs.get("cell_methods", "")).lower()
+    for names, method in re.findall(r"((?:\w+\s*:\s*)+)(\w+)", re.sub(r"\([^)]*\)", "", methods)):
+        if {"time", "t", clock.lower()} & set(re.findall(r"\w+", names)):
+            return str(method)
+    online = str(variable.attrs.get("online_operation", "")).lower()
+    return {"average": "mean", "instant": "point"}.get(online, "")
+
+
+def _middles(at: Catalogue, variable: Any, clock: str, times: Times) -> tuple[Times, str, tuple[str, ...]]:
+    """Times at the middle of the intervals that values are means over; words on it; notes."""
+    method = _over_time(variable, clock)
+    mean = method in MEAN_WORDS
+    if at.said.stamps is not None:
+        # the interval is known once all files are joined
+        return times, f"means, stamped at the {at.said.stamps} of their interval, as you say", ()
+    if "climatology" in at.data[clock].attrs:
+        note = f"`{clock}` is of a climatology: means over several years, no forecast of any day"
+        return times, "a climatology", (note,)
+    bounds = str(at.data[clock].attrs.get("bounds", ""))
+    if method == "point":
+        return times, "instants, as `cell_methods` says", ()
+    if bounds in at.data.variables and at.data[bounds].shape == (times.size, 2):
+        limits = at.data[bounds]
+        units = units_of(limits) or _units(at.data[clock], at.said)
+        known = limits.assign_attrs(calendar=at.data[clock].attrs.get("calendar", "standard"))
+        ends, _ = _decoded(at, known.rename(bounds), at.said, units)
+        assert ends is not None
+        middle = ends[:, 0] + (ends[:, 1] - ends[:, 0]) // 2
+        hours = (middle - times) / np.timedelta64(3_600_000, "ms")
+        inside = bool(((times >= ends.min(axis=1)) & (times <= ends.max(axis=1))).all())
+        require(inside, f"the bounds `{bounds}` of `{clock}` in {at.name} do not hold its times; mend the file")
+        span = float((np.abs(ends[:, 1] - ends[:, 0])).max() / np.timedelta64(3_600_000, "ms"))
+        if span == 0:
+            return times, f"instants, as `{bounds}` says", ()
+        words = f"means over {span:g} h, at the middle of `{bounds}`"
+        off = float(np.abs(hours).max())
+        if off < 1e-3:
+            return times, words, ()
+        return middle, words, (f"the times stand {off:g} h from the middle of `{bounds}`: taken at the middle",)
+    title = next((text for key in TITLES if MEAN_TITLES.search(text := str(at.data.attrs.get(key, "")))), None)
+    title = "field_type = mean" if str(at.data.attrs.get("field_type", "")).lower() == "mean" else title
+    if mean or title is not None:
+        why = f"`{variable.name}` says {method!r} over time" if mean else f"the file says {title[:60]!r}"  # type: ignore[index]
+        note = (
+            f"{why}, and gives no bounds of its times: read as if each stood at the middle of its interval; "
+            'name `stamps` = "start" or "end" in `names` if it does not'
+        )
+        return times, "means, taken to stand at the middle of their interval (no bounds)", (note,)
+    return times, "instants: nothing says that they are means", ()
+
+
+def _forecast(at: Catalogue, variable: Any) -> Clock | None:
+    """Times of runs and lead times, where a variable has such dimensions."""
+    dims = [str(dim) for dim in variable.dims]
+    lead = next((dim for dim in dims if _is_lead(at, dim)), None)
+    if lead is None:
+        return None
+    run = next((dim for dim in dims if dim != lead and _is_reference(at, dim)), None)
+    picked, chosen = ({}, "") if run is None else _chosen_run(at, variable, run)
+    valid = next(
+        (
+            at.data[name]
+            for name in map(str, at.data.variables)
+            if lead in at.data[name].dims
+            and set(at.data[name].dims) <= {lead, run}
+            and SINCE.search(_units(at.data[name], Names()))
+        ),
+        None,
+    )
+    if valid is not None:
+        one = valid.isel({dim: n for dim, n in picked.items() if dim in valid.dims})
+        times, notes = _decoded(at, one, at.said)
+        return Clock(
+            times, (lead,), picked, f"{valid.name}{chosen}", "instants: nothing says that they are means", notes
+        )
+    starts = [name for name in map(str, at.data.variables) if _is_start(at, name, run)]
+    if len(starts) != 1:
+        raise InputError(
+            f"`{variable.name}` in {at.name} counts its times by `{lead}` from the start of a forecast, "
+            "which the file does not give; name `time` in `names`, or add the variable of the reference time"
+        )
+    start = at.data[starts[0]].isel({dim: n for dim, n in picked.items() if dim in at.data[starts[0]].dims})
+    begin, notes = _decoded(at, start, at.said)
+    if begin is None:
+        return None
+    period = at.data[lead]
+    seconds = in_seconds(units_of(period))
+    if seconds is None:
+        raise InputError(
+            f"the lead time `{lead}` in {at.name} is in {units_of(period)!r}, which is no unit of time"
+        )
+    after = np.rint(np.asarray(period.values, np.float64) * seconds * 1e3).astype("timedelta64[ms]")
+    words = f"{starts[0]} + {lead}{chosen}"
+    return Clock(
+        begin.ravel()[0] + after, (lead,), picked, words, "instants: nothing says that they are means", notes
+    )
+
+
+def _is_lead(at: Catalogue, dim: str) -> bool:
+    if dim not in at.data.variables or at.data[dim].dims != (dim,):
+        return False
+    one = at.data[dim]
+    named = standard_name(one) == "forecast_period" or LEAD.match(dim) is not None
+    return named and not SINCE.search(units_of(one))
+
+
+def _is_reference(at: Catalogue, dim: str) -> bool:
+    if REFERENCE.match(dim):
+        return True
+    if dim not in at.data.variables:
+        return False
+    return standard_name(at.data[dim]) == "forecast_reference_time" or bool(SINCE.search(units_of(at.data[dim])))
+
+
+def _is_start(at: Catalogue, name: str, run: str | None) -> bool:
+    """Whether a variable is the time at which the chosen run begins."""
+    one = at.data[name]
+    if not SINCE.search(_units(one, at.said)):
+        return False
+    if run is not None:
+        return bool(one.dims == (run,))
+    known = standard_name(one) in ("forecast_reference_time", "time") or REFERENCE.match(name) or name == "time"
+    return one.size == 1 and bool(known)
+
+
+def _chosen_run(at: Catalogue, variable: Any, run: str) -> tuple[dict[str, int], str]:
+    """Which run is read: the only one, or the user's word."""
+    size = variable.sizes[run]
+    if size == 1:
+        return {run: 0}, ""
+    said = at.said.run
+    known = _decoded(at, at.data[run], at.said)[0] if run in at.data.variables else None
+    listed = (
+        "" if known is None else f", {known[0].astype('datetime64[s]')}Z to {known[-1].astype('datetime64[s]')}Z"
+    )
+    require(
+        said is not None,
+        f"{at.name} holds {size} runs of a forecast along `{run}`{listed}: name `run` in `names`, its number "
+        "from 0 or its date",
+    )
+    if isinstance(said, int):
+        require(0 <= said < size, f"`run` must be a number from 0 to {size - 1} in {at.name}; got {said}")
+        which = said
+    else:
+        when = parse_time(str(said), "`run`")
+        hits = np.flatnonzero(known == when) if known is not None else np.zeros(0, np.int64)
+        require(len(hits) == 1, f"{at.name} holds no run of {said}{listed}; name another `run`")
+        which = int(hits[0])
+    told = which if known is None else f"{known[which].astype('datetime64[s]')}Z"
+    return {run: which}, f", run {told} of {size}"
