@@ -241,7 +241,7 @@ def _answer(
     if front and (departures or not alone):
         raise click.UsageError(
             "--trade-off goes with none of --output, --most-energy, --polish, --thin, --card, "
-            "--window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one of them out"
+            "--window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave some out"
         )
     if departures and not alone:
         raise click.UsageError(

@@ -96,7 +96,7 @@ def polished(path: Path, planner: RoutePlanner) -> Path:
     bound = rule != Surfacing()
     fixed = bound or problem.to_lonlat is not None
     stays = (lambda stop: bool(stop[2] >= -SURFACE)) if fixed else (lambda stop: False)
-    polisher = Polisher(problem, stays, frozen=planner.assembly.frozen, single_yos=not bound)
+    polisher = Polisher.of(problem, path, stays=stays, frozen=planner.assembly.frozen, single_yos=not bound)
     kept = replace(path, unpolished=(len(path.legs), path.travel_time, path.cost))
     chain = polisher.chain_of(path)
     if chain is None:

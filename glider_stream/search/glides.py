@@ -12,8 +12,8 @@ from ..base.threads import in_parallel
 from ..kernels.legs import fly_legs, legs_fit
 from ..roadmap.evaluator import Evaluator
 
-LEGS_AT_ONCE = 256
-"""Legs that a thread flies at once: lanes are full, and the steps of all are a few milliseconds."""
+LEGS_AT_ONCE = 1024
+"""Legs that a thread flies at once, for some milliseconds: fewer would wait for threads to begin."""
 CLOSE = 1e-5
 """A leg that ends this near its stop [m] is exact: hundreds of legs together then miss by no millimetre."""
 MOST_STEPS = 12

@@ -23,6 +23,8 @@ MOST_SINGLE = 24
 """A route of more legs gets no single yos: its number of yos is found for the whole of it."""
 MOST_TRIES = 12
 """Single yos that are tried at most."""
+TRIAL_MOVES = 6
+"""Newton steps for each barrier that a route which is only tried is given."""
 YO_PAYS = 1e-3
 """A single yo must gain such a share."""
 PAYS = 1e-5
@@ -43,7 +45,7 @@ def improve(polisher: Polisher, chain: Chain) -> Chain:
         cut = _cut(polisher, best)
         if cut is None or cut.cost > (1 - CUT_PAYS) * best.cost:
             break
-        best = cut
+        best = polisher.polish(cut)
     return _joined(polisher, best)
 
 
@@ -55,7 +57,7 @@ def _with_more_yos(polisher: Polisher, chain: Chain) -> Chain:
             tries += 1
             more = _zigzag(polisher, chain, leg)
             if more is not None and more.cost < (1 - YO_PAYS) * chain.cost:
-                chain = more
+                chain = polisher.polish(more)
                 break
             if tries == MOST_TRIES:
                 break
@@ -73,15 +75,16 @@ def _zigzag(polisher: Polisher, chain: Chain, leg: int) -> Chain | None:
         polisher.air.along(chain.stops[one], chain.stops[leg + 1 : leg + 2], of, share)[0] for share in (0.4, 0.6)
     )
     rise = end[2] - begin[2]
-    ahead[2], back[2] = begin[2] + 0.6 * rise, begin[2] + 0.4 * rise
+    way_back = math.copysign(max(0.2 * abs(rise), 1.2 * polisher.least_rise), rise)
+    ahead[2], back[2] = begin[2] + 0.5 * (rise + way_back), begin[2] + 0.5 * (rise - way_back)
     stops = np.concatenate([chain.stops[: leg + 1], [ahead, back], chain.stops[leg + 1 :]])
-    steeper = np.arctan(1.5 * np.tan(glides.angle[leg]))
+    steeper = np.arctan((1 + way_back / rise) / 0.8 * np.tan(glides.angle[leg]))
     lowest, highest = polisher.air.angles(np.diff(stops[:, 2]) > 0)
     angle = np.insert(glides.angle, leg, [steeper, glides.angle[leg]])
     angle[leg + 2] = steeper
     heading = np.insert(glides.heading, leg, [glides.heading[leg]] * 2)
     found = polisher.chain(stops, np.clip(angle, lowest, highest), heading)
-    return None if found is None else polisher.polish(found)
+    return None if found is None else polisher.polish(found, TRIAL_MOVES)
 
 
 def _best_count(polisher: Polisher, chain: Chain) -> Chain:
@@ -108,7 +111,7 @@ def _best_count(polisher: Polisher, chain: Chain) -> Chain:
                 break
             at += way
     found = tried[at]
-    return chain if found is None else found
+    return chain if found is None else polisher.polish(found)
 
 
 def _likely_legs(polisher: Polisher, chain: Chain) -> float:
@@ -175,7 +178,7 @@ def _respaced(polisher: Polisher, chain: Chain, legs: int) -> Chain | None:
     lowest, highest = polisher.air.angles(rise > 0)
     angle = np.clip(np.arctan2(np.abs(rise) / time, np.hypot(*through.T)), lowest, highest)
     found = polisher.chain(stops, angle, np.arctan2(through[:, 1], through[:, 0]))
-    return None if found is None else polisher.polish(found)
+    return None if found is None else polisher.polish(found, TRIAL_MOVES)
 
 
 def _cut(polisher: Polisher, chain: Chain) -> Chain | None:
@@ -185,7 +188,7 @@ def _cut(polisher: Polisher, chain: Chain) -> Chain | None:
     stops[::2] = chain.stops
     stops[1::2] = polisher.air.along(chain.stops[:-1], chain.stops[1:], glides, 0.5)
     found = polisher.chain(stops, np.repeat(glides.angle, 2), np.repeat(glides.heading, 2))
-    return None if found is None else polisher.polish(found)
+    return None if found is None else polisher.polish(found, TRIAL_MOVES)
 
 
 def _joined(polisher: Polisher, chain: Chain) -> Chain:

@@ -9,7 +9,7 @@ the diagonal, since a stop meets two legs alone. Every iterate is a route that c
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,13 @@ from ..roadmap.problem import Problem
 from .glides import Air, Glides, Slopes
 from .path import Hop, Path
 
-LEAST_RISE = 2.0
-"""A polished leg dives or climbs so far at least [m]: a shorter one is no glide."""
+LEAST_RISE = 0.1
+"""A polished leg dives or climbs at least so much of the domain's depth, or SHORTER of the shortest leg that the
+route had: else a route would hold the depth of the best current by ever smaller yos, which no vehicle flies."""
+SHORTER = 0.5
 BARRIERS = (1e-4, 5e-6)
 """Weights, in turn, of the barrier that keeps legs off the ends of the glide polar, of the horizon and
-of LEAST_RISE, in shares of the route's cost: it moves an optimum away from such an end by about so much."""
+of the least rise, in shares of the route's cost: it moves an optimum away from such an end by about so much."""
 NEARER = 0.1
 """In one step a leg comes nearer to such an end to this share of its distance at most."""
 CURVED = (20.0, 20.0, 8.0)
@@ -59,13 +61,21 @@ class Polisher:
     """Makes routes of a problem better.
 
     `stays` says of a stop whether it keeps its depth; `frozen`: every leg meets the current of the departure;
-    `single_yos`: whether yos may be put into single legs, with a top under water.
+    `single_yos`: whether yos may be put into single legs, with a top under water; `least_rise` [m] of a leg.
     """
 
     problem: Problem
     stays: Callable[[Array], bool] = lambda stop: False
     frozen: bool = False
     single_yos: bool = True
+    least_rise: float = 1.0
+
+    @classmethod
+    def of(cls, problem: Problem, path: Path, **how: Any) -> "Polisher":
+        """With the least rise that fits a path."""
+        shortest = min(abs(float(leg.end[2] - leg.start[2])) for leg in path.legs)
+        depth = float(problem.hi[2] - problem.lo[2])
+        return cls(problem, least_rise=min(LEAST_RISE * depth, SHORTER * shortest), **how)
 
     @property
     def air(self) -> Air:
@@ -111,11 +121,11 @@ class Polisher:
         legs = price.per_second * float(glides.time.sum()) + price.per_leg * len(glides.time)
         return legs + float(self._pumped(stops[:-1, 2])[self._turns(stops)].sum())
 
-    def polish(self, chain: Chain) -> Chain:
-        """Newton's method on the stops between start and goal."""
+    def polish(self, chain: Chain, moves: int = MOST_MOVES) -> Chain:
+        """Newton's method on the stops between start and goal, at most so many moves for each barrier."""
         for weight in BARRIERS:
             damping, small = 1e-3, 0
-            for _ in range(MOST_MOVES if len(chain.stops) > 2 else 0):
+            for _ in range(moves if len(chain.stops) > 2 else 0):
                 better, damping = self._step(chain, weight * chain.cost, damping)
                 if better is None:
                     break
@@ -170,7 +180,7 @@ class Polisher:
     def _within(self, stops: Array, glides: Glides) -> NDArray[np.bool_]:
         """Which legs (n,) may be flown: in water, within the horizon, neither too short nor turned round."""
         integration = self.problem.evaluator.integration
-        short = np.abs(np.diff(stops[:, 2])) < min(LEAST_RISE, 0.5)
+        short = np.abs(np.diff(stops[:, 2])) < self.least_rise
         late = glides.time > integration.dt * integration.steps
         late |= glides.departs + glides.time > self.problem.evaluator.flow.extent.t_hi
         fits = glides.exact & ~short & ~late & np.isfinite(glides.time)
@@ -189,7 +199,7 @@ class Polisher:
                 (glides.angle - lowest) / span,
                 (highest - glides.angle) / span,
                 1 - glides.time / horizon,
-                (np.abs(rise) - LEAST_RISE) / depth,
+                (np.abs(rise) - self.least_rise) / depth,
             ],
             axis=1,
         )

@@ -1,4 +1,4 @@
-"""Polished routes: never worse, exact, within their limits; their derivatives; where a closed form is known, it."""
+"""Polished routes: never worse, exact, within their limits; their derivatives; a closed form met."""
 
 import math
 from dataclasses import replace
@@ -38,6 +38,11 @@ def in_flow(problem, flow, **changes):
     return replace(problem, evaluator=replace(problem.evaluator, flow=flow, **changes))
 
 
+def polisher(problem):
+    """Of routes whose legs may be as short as 15 m."""
+    return Polisher(problem, least_rise=15.0)
+
+
 def zigzag(start, goal, legs, deepest):
     """Stops evenly from start to goal, at the surface and at a height by turns."""
     stops = np.linspace(start, goal, legs + 1)
@@ -49,14 +54,14 @@ def route(problem, stops):
     """The route through stops, from the controls of still water."""
     way = np.diff(stops, axis=0)
     angle = np.arctan2(np.abs(way[:, 2]), np.hypot(way[:, 0], way[:, 1]))
-    found = Polisher(problem).chain(stops, angle, np.arctan2(way[:, 1], way[:, 0]))
+    found = polisher(problem).chain(stops, angle, np.arctan2(way[:, 1], way[:, 0]))
     assert found is not None
     return found
 
 
 def test_a_polished_route_is_quicker_and_says_what_it_was(found):
     before, after = found
-    assert after.travel_time < 0.99 * before.travel_time
+    assert after.travel_time < 0.995 * before.travel_time
     assert after.unpolished == (len(before.legs), before.travel_time, before.cost)
     assert after.as_dict()["unpolished"]["travel_time_s"] == before.travel_time
     assert f"; before it was polished {len(before.legs)}, " in str(after)
@@ -89,22 +94,22 @@ def test_a_floor_is_kept(problem):
     shallow = in_flow(problem, problem.evaluator.flow, terrain=OpenWater(-100.0))
     start, goal = np.array([-150.0, 150.0, 0.0]), np.array([120.0, -120.0, 0.0])
     chain = route(shallow, zigzag(start, goal, 4, -70.0))
-    after = improve(Polisher(shallow), chain)
+    after = improve(polisher(shallow), chain)
     assert after.cost < chain.cost
     assert after.stops[:, 2].min() >= -100.0
 
 
 def test_polish_of_a_polished_route_changes_next_to_nothing(problem):
     chain = route(problem, zigzag(np.array([-150.0, 150.0, 0.0]), np.array([120.0, -120.0, 0.0]), 4, -90.0))
-    once = Polisher(problem).polish(chain)
-    twice = Polisher(problem).polish(once)
+    once = polisher(problem).polish(chain)
+    twice = polisher(problem).polish(once)
     assert once.cost * (1 - 1e-4) < twice.cost <= once.cost
 
 
 def test_derivatives_are_those_of_flown_legs(problem, gyre):
     for flow in (problem.evaluator.flow, gyre):
         chain = route(
-            in_flow(problem, flow), zigzag(np.array([-100.0, 100.0, 0.0]), np.array([60.0, -80.0, 0.0]), 2, -90.0)
+            in_flow(problem, flow), zigzag(np.array([-100.0, 100.0, 0.0]), np.array([60.0, -80.0, 0.0]), 2, -60.0)
         )
         air = Air(replace(problem.evaluator, flow=flow))
         begin, end, glides = chain.stops[:-1], chain.stops[1:], chain.glides
@@ -125,12 +130,12 @@ def test_derivatives_are_those_of_flown_legs(problem, gyre):
 
 def test_the_clock_runs_from_leg_to_leg(problem, gyre):
     swinging = in_flow(problem, gyre)
-    chain = route(swinging, zigzag(np.array([-100.0, 100.0, 0.0]), np.array([60.0, -80.0, 0.0]), 4, -60.0))
-    after = Polisher(swinging).polish(chain)
+    chain = route(swinging, zigzag(np.array([-100.0, 100.0, 0.0]), np.array([60.0, -80.0, 0.0]), 4, -30.0))
+    after = polisher(swinging).polish(chain)
     assert after.cost < chain.cost
     np.testing.assert_allclose(after.glides.departs[1:], np.cumsum(after.glides.time)[:-1], atol=1e-9)
     evaluator, at = swinging.evaluator, after.stops[0]
-    for _, end, edge in Polisher(swinging).hops(after):
+    for _, end, edge in polisher(swinging).hops(after):
         n = [*map(tuple, after.stops[1:])].index(tuple(end))
         rows = evaluator.trace(at, edge, after.glides.departs[n])
         at = rows[-1, 1:]
@@ -143,9 +148,9 @@ def test_in_a_uniform_current_it_is_the_straight_optimum(problem):
     even = in_flow(problem, Uniform(*current).kernel(HEIGHTS))
     start = np.array([-150.0, 150.0, 0.0])
     goal = start + np.array([*way, 0.0])
-    stops = zigzag(start, goal, 4, -60.0)
+    stops = zigzag(start, goal, 4, -40.0)
     stops[1:-1, :2] += [[40.0, 30.0], [-20.0, 50.0], [-30.0, -40.0]]
-    after = improve(Polisher(even), route(even, stops))
+    after = improve(polisher(even), route(even, stops))
     fastest = float(even.evaluator.polar.best_horizontal.max())
     # (fastest^2 - |c|^2) T^2 + 2 c.way T - |way|^2 = 0
     a, b = fastest**2 - current @ current, current @ way
@@ -160,7 +165,7 @@ def test_energy_is_what_is_polished_where_the_cost_is_energy(problem):
     pump = Energy(hotel=0.5, trim=5.0, volume=500.0, efficiency=((100.0, 0.15), (1000.0, 0.45)), density=1025.0)
     costly = in_flow(problem, problem.evaluator.flow, cost=pump)
     chain = route(costly, zigzag(np.array([-150.0, 150.0, 0.0]), np.array([120.0, -120.0, 0.0]), 4, -90.0))
-    after = improve(Polisher(costly), chain)
+    after = improve(polisher(costly), chain)
     time, legs = after.glides.time.sum(), len(after.glides.time)
     turns = [z for before, z, then in zip(*(after.stops[n : n - 2 or None, 2] for n in range(3)), strict=True)
              if before > z < then]  # fmt: skip
