@@ -123,6 +123,7 @@ class Polisher:
 
     def polish(self, chain: Chain, moves: int = MOST_MOVES) -> Chain:
         """Newton's method on the stops between start and goal, at most so many moves for each barrier."""
+        first = chain
         for weight in BARRIERS:
             damping, small = 1e-3, 0
             for _ in range(moves if len(chain.stops) > 2 else 0):
@@ -133,7 +134,7 @@ class Polisher:
                 small = small + 1 if abs(gain) < ENOUGH * chain.cost else 0
                 if small == SMALL_STEPS:
                     break
-        return chain
+        return min(first, chain, key=lambda one: one.cost)  # the barrier may have moved it the wrong way
 
     def _step(self, chain: Chain, weight: float, damping: float) -> tuple[Chain | None, float]:
         """A Newton step, damped as far as it must be: a better route, if there is one, and the next damping."""

@@ -103,29 +103,27 @@ def test_polish_of_a_polished_route_changes_next_to_nothing(problem):
     chain = route(problem, zigzag(np.array([-150.0, 150.0, 0.0]), np.array([120.0, -120.0, 0.0]), 4, -90.0))
     once = polisher(problem).polish(chain)
     twice = polisher(problem).polish(once)
-    assert once.cost * (1 - 1e-4) < twice.cost <= once.cost
+    assert once.cost * (1 - 1e-3) < twice.cost <= once.cost
 
 
 def test_derivatives_are_those_of_flown_legs(problem, gyre):
-    for flow in (problem.evaluator.flow, gyre):
-        chain = route(
-            in_flow(problem, flow), zigzag(np.array([-100.0, 100.0, 0.0]), np.array([60.0, -80.0, 0.0]), 2, -60.0)
-        )
-        air = Air(replace(problem.evaluator, flow=flow))
-        begin, end, glides = chain.stops[:-1], chain.stops[1:], chain.glides
-        slopes = air.slopes(begin, end, glides)
-        for n in range(7):
-            times = []
-            for step in (0.5, -0.5):
-                ends, departs = np.concatenate([begin, end], axis=1), glides.departs.copy()
-                if n == 6:
-                    departs += step
-                else:
-                    ends[:, n] += step
-                beside = air.glide(ends[:, :3], ends[:, 3:], glides.angle, glides.heading, departs)
-                assert beside.exact.all()
-                times.append(beside.time)
-            np.testing.assert_allclose(slopes.time[:, n], times[0] - times[1], rtol=5e-3, atol=2e-4)
+    swinging = in_flow(problem, gyre)
+    chain = route(swinging, zigzag(np.array([-100.0, 100.0, 0.0]), np.array([60.0, -80.0, 0.0]), 2, -60.0))
+    air = Air(swinging.evaluator)
+    begin, end, glides = chain.stops[:-1], chain.stops[1:], chain.glides
+    slopes = air.slopes(begin, end, glides)
+    for n in range(7):
+        times = []
+        for step in (0.5, -0.5):
+            ends, departs = np.concatenate([begin, end], axis=1), glides.departs.copy()
+            if n == 6:
+                departs += step
+            else:
+                ends[:, n] += step
+            beside = air.glide(ends[:, :3], ends[:, 3:], glides.angle, glides.heading, departs)
+            assert beside.exact.all()
+            times.append(beside.time)
+        np.testing.assert_allclose(slopes.time[:, n], times[0] - times[1], rtol=1e-3, atol=1e-4)
 
 
 def test_the_clock_runs_from_leg_to_leg(problem, gyre):
@@ -155,8 +153,8 @@ def test_in_a_uniform_current_it_is_the_straight_optimum(problem):
     # (fastest^2 - |c|^2) T^2 + 2 c.way T - |way|^2 = 0
     a, b = fastest**2 - current @ current, current @ way
     best = (-b + math.sqrt(b * b + a * (way @ way))) / a
-    assert best <= after.cost * (1 + 1e-9)
-    assert after.cost < 1.0005 * best
+    assert best <= after.cost * (1 + 1e-7)  # legs end within 0.01 mm of their stops
+    assert after.cost < 1.0001 * best
 
 
 def test_energy_is_what_is_polished_where_the_cost_is_energy(problem):
