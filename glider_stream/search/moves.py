@@ -21,7 +21,7 @@ MOST_COUNTS = 12
 """Numbers of yos that are tried at most."""
 MOST_SINGLE = 24
 """A route of more legs gets no single yos: its number of yos is found for the whole of it."""
-MOST_TRIES = 12
+MOST_TRIES = 24
 """Single yos that are tried at most."""
 TRIAL_MOVES = 6
 """Newton steps for each barrier that a route which is only tried is given."""

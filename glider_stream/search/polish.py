@@ -21,7 +21,7 @@ from ..roadmap.problem import Problem
 from .glides import Air, Glides, Slopes
 from .path import Hop, Path
 
-LEAST_RISE = 0.1
+LEAST_RISE = 0.05
 """A polished leg dives or climbs at least so much of the domain's depth, or SHORTER of the shortest leg that the
 route had: else a route would hold the depth of the best current by ever smaller yos, which no vehicle flies."""
 SHORTER = 0.5
