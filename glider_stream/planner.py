@@ -197,6 +197,7 @@ def query(
     window_hours: float = HOURS,
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
+    polish: bool = False,
 ) -> Path:
     """The cheapest path between two points, see `OpenedRoadmap.query`.
 
@@ -214,6 +215,7 @@ def query(
         goal,
         outputs=outputs,
         most_energy=most_energy,
+        polish=polish,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
@@ -233,6 +235,7 @@ def plan(
     window_hours: float = HOURS,
     *,
     overrides: Sequence[str] = (),
+    polish: bool = False,
 ) -> Path:
     """The cheapest path of a scenario without a roadmap; all else as in `query`.
 
@@ -248,6 +251,7 @@ def plan(
         goal,
         outputs=outputs,
         most_energy=most_energy,
+        polish=polish,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,

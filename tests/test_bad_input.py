@@ -218,8 +218,8 @@ SETS = {
     "a whole section": ("sampling={kind='sobol'}", "section.key=value"),
     "more than any memory": (
         "sampling.shape=[9000000000,90000000,9]",
-        "not enough memory",
-        "make the problem",
+        "7,290,000,000,000,000,000 nodes",
+        "take at most 10,000,000",
     ),
     "a file for a flow that has none": ("flow.file=a.nc", "`flow.file` is not known"),
 }
