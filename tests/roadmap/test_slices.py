@@ -90,7 +90,7 @@ def test_every_slice_meets_its_targets():
     road = sliced()
     for number, departure in enumerate(road.departures):
         one = road.at(number)
-        some = np.arange(0, one.target.size, 100)
+        some = np.arange(0, one.target.size, 50)
         source = np.repeat(np.arange(len(one.position)), np.diff(one.indptr))[some]
         values = np.column_stack([getattr(one, name)[some] for name in EDGE_FIELDS])
         ends = problem().evaluator, departure, one.position, source, one.target[some].astype(int), values
