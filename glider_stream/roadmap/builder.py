@@ -60,7 +60,8 @@ def warm_up(problem: Problem) -> None:
     nobody = np.zeros(1, np.int64)
     problem.legs(problem.lo[None]).of(nobody)
     if len(problem.departures) > 1:
-        for _ in Follower.of(problem, problem.lo[None]).slices(nobody):
+        follower = replace(Follower.of(problem, problem.lo[None]), few=0)
+        for _ in replace(follower, problem=replace(problem, slices=problem.departures[:2])).slices(nobody):
             pass
 
 
