@@ -112,8 +112,7 @@ def jobs():
     found["shard from"] = [*ocean, "-o", "out.h5", "--shard", "2/3", "--from", "old.h5"], ["out.h5"]
     found["shard"] = ["build", "seed-box", "-o", "out.h5", "--shard", "1/2"], ["out.h5"]
     found["merge"] = ["merge", "part1.h5", "part2.h5", "-o", "out.h5"], ["out.h5"]
-    endings = ("json", "geojson", "kml", "gpx", "csv")
-    files = [f"out.{ending}" for ending in endings]
+    files = ["out.json", "out.csv", "out.windows.csv"]  # of a box in metres; maps' files are moved alike
     found["query"] = ["query", "road.h5", *(word for file in files for word in ("-o", file))], files
     found["plot"] = ["plot", "road.h5", "path.json", "-o", "out.png"], ["out.png"]
     found["page"] = ["plot", "road.h5", "path.json", "-o", "out.html"], ["out.html"]

@@ -43,14 +43,18 @@ class Murmur:
 
     encoding = "utf-8"
 
+    def __init__(self) -> None:
+        """The stream of this moment: a live bar puts one of its own in its place, which writes here."""
+        self._stream = sys.stderr
+
     def write(self, text: str) -> int:
         """Write, or do not."""
         try:
-            if sys.stderr is not None:
-                sys.stderr.write(text)
-                sys.stderr.flush()
+            if self._stream is not None:
+                self._stream.write(text)
+                self._stream.flush()
         except (OSError, ValueError):
-            silence(sys.stderr)
+            silence(self._stream)
         return len(text)
 
     def flush(self) -> None:
@@ -59,15 +63,15 @@ class Murmur:
     def isatty(self) -> bool:
         """Whether somebody watches."""
         try:
-            return sys.stderr is not None and sys.stderr.isatty()
+            return self._stream is not None and self._stream.isatty()
         except (OSError, ValueError):
             return False
 
     def fileno(self) -> int:
         """As the system knows it; OSError where there is none."""
-        if sys.stderr is None:
+        if self._stream is None:
             raise OSError("standard error is closed")
-        return sys.stderr.fileno()
+        return self._stream.fileno()
 
 
 def silence(stream: IO[Any] | None) -> None:
