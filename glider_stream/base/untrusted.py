@@ -62,7 +62,7 @@ def check_links(path: str | Path) -> None:
                 elif isinstance(one, h5py.Dataset):
                     own = not one.external and not one.is_virtual
                     require(own, f"the data of `{name}` in {path} lie in other files, not followed: copy them in")
-                    _check_storage(path, name, one)
+                    _check_storage(path, str(one.name).lstrip("/"), one)
 
 
 def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
