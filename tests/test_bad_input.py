@@ -565,7 +565,7 @@ def test_standard_output_that_takes_nothing(place):
     assert_refused((code, "", err), "standard output cannot be used: no space left on device")
     reader, writer = os.pipe()
     os.close(reader)
-    assert run_with({}, "info", "road.h5", stdout=writer) == (141, None, "")  # as the shell says of one whose reader has gone
+    assert run_with({}, "info", "road.h5", stdout=writer) == (141, None, "")  # as a shell has it
     os.close(writer)
 
 
