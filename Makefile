@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV ?= .venv
 RUN = $(VENV)/bin
 
-.PHONY: install demo test bench clean
+.PHONY: install demo test lint types docs bench clean
 
 install: $(VENV)/installed
 
@@ -13,18 +13,30 @@ $(VENV)/installed: pyproject.toml
 
 demo: install
 	mkdir -p demo
-	$(RUN)/glider-stream build seed-box -o demo/seed-box.h5
-	$(RUN)/glider-stream query demo/seed-box.h5 -o demo/path.json
-	$(RUN)/glider-stream plot demo/seed-box.h5 demo/path.json -o demo/route.png
-	$(RUN)/glider-stream plot demo/seed-box.h5 -o demo/roadmap.png
-	@echo "The roadmap is demo/seed-box.h5, the route demo/path.json; look at demo/route.png and demo/roadmap.png"
+	$(RUN)/glider-stream build seed-box -o demo/paper.h5
+	$(RUN)/glider-stream query demo/paper.h5 -o demo/paper.json
+	$(RUN)/glider-stream build seed-box --set steering.method=flow-map --set neighbours.kind=all -o demo/exact.h5
+	$(RUN)/glider-stream query demo/exact.h5 -o demo/exact.json
+	$(RUN)/glider-stream plot demo/exact.h5 demo/paper.json demo/exact.json -o demo/routes.png
+	@echo "paper: the control line with 16 controls, to the 27 nearest nodes, as in the paper."
+	@echo "exact: the flow map, to all nodes. Look at demo/routes.png: both routes, with their times."
 
 test: install
 	$(RUN)/python -m pytest -n 2 --dist worksteal
+
+lint: install
+	$(RUN)/python -m ruff check .
+	$(RUN)/python -m ruff format --check .
+
+types: install
+	$(RUN)/python -m mypy
+
+docs: install
+	$(RUN)/python -m mkdocs build --strict
 
 bench: install
 	$(RUN)/glider-stream bench --against benchmarks/records/bench.json
 
 clean:
-	rm -rf $(VENV) demo build *.egg-info
+	rm -rf $(VENV) demo site build *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -75,14 +75,14 @@ def cli() -> None:
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-@click.option("--shard", metavar="K/N", help="Build part K of N alone, for `merge`.")
-@click.option("--restart", is_flag=True, help="Forget what a stopped build has kept, and begin anew.")
+@click.option("--shard", metavar="K/N", help="Build only part K of N, for `merge`.")
+@click.option("--restart", is_flag=True, help="Discard what a stopped build has kept, and begin again.")
 @click.option(
-    "--from", "base", type=FILE, metavar="OLD", help="Take over what a new current cannot have changed."
+    "--from", "base", type=FILE, metavar="OLD", help="Reuse the legs that a new current cannot have changed."
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Evaluate on a Dask cluster; local:N for N processes here.")
 @click.option(
-    "--checkpoint", type=float, metavar="SECONDS", help="How often the disk must keep it; 30 if not given."
+    "--checkpoint", type=float, metavar="SECONDS", help="Seconds between writes to disk; 30 if not given."
 )
 def build(
     scenario: str,
@@ -97,7 +97,7 @@ def build(
 ) -> None:
     """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
 
-    What is found is kept beside the output until it is whole: the same command goes on where it was stopped.
+    Results are kept beside the output until it is complete: the same command continues a stopped build.
     """
     from . import planner
     from .base.progress import reporter
@@ -230,7 +230,7 @@ def _answer(
     free = most_yos is None and most_hours is None
     rule = None if free else Surfacing(most_yos, most_hours)
     departures = depart_between is not None or arrive_by is not None
-    said: Any
+    answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     alone = not outputs and most_energy is None and thin is None and not asked and not as_card
@@ -248,11 +248,11 @@ def _answer(
         raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
     if front:
         corners = opened().trade_off(start, goal, surfacing=rule)
-        said, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
+        answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     elif departures:
         ends: dict[str, Any] = {"start": start, "goal": goal, "surfacing": rule}
-        said = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
-        found = said.found
+        answer = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
+        found = answer.found
     else:
         for output in outputs:
             check_export(output)
@@ -262,11 +262,11 @@ def _answer(
         )
         for note in path.notes:
             say(f"note: {note}", error=True)
-        said, found = source.card(path) if as_card and path.found else path, path.found
+        answer, found = source.card(path) if as_card and path.found else path, path.found
     if as_json:
-        _write_json(said.as_dict())
+        _write_json(answer.as_dict())
     else:
-        say(said, error=not found)
+        say(answer, error=not found)
     if not found:
         sys.exit(1)
 
@@ -281,11 +281,11 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
     """Say what ROADMAP holds."""
     from . import planner
 
-    said = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
+    answer = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
     if as_json:
-        _write_json(said.as_dict())
+        _write_json(answer.as_dict())
     else:
-        say(said)
+        say(answer)
 
 
 @cli.command()
@@ -294,7 +294,7 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
 @click.option("--sample", type=int, default=200, show_default=True, help="Edges for DOP853; 0 for all.")
 @JSON
 def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool) -> None:
-    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if it is not what it says."""
+    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if a leg differs."""
     from . import planner
 
     verification = planner.verify(roadmap, sample, overrides=overrides)
@@ -309,24 +309,36 @@ def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool
 @cli.command()
 @ROADMAP
 @ELSEWHERE
-@click.argument("path", required=False, type=FILE)
+@click.argument("paths", nargs=-1, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
-@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for a route.")
+@click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for one route.")
 @click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
-@click.option("--fronts", type=float, metavar="HOURS", help="As --chart, with what is reached every HOURS.")
+@click.option("--fronts", type=float, metavar="HOURS", help="A chart, with what is reached every HOURS.")
 def plot(
     roadmap: Path,
     overrides: tuple[str, ...],
-    path: Path | None,
+    paths: tuple[Path, ...],
     output: Path,
     depths: tuple[float, ...],
     chart: bool,
     fronts: float | None,
 ) -> None:
-    """Draw the route in PATH (JSON, from query) over ROADMAP's current; without PATH, the roadmap."""
+    """Draw the route in PATHS (JSON, from query) over ROADMAP's current; without PATHS, the roadmap.
+
+    Two to four files are drawn side by side, to compare the routes.
+    """
     from . import planner
 
-    planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts, overrides=overrides)
+    if len(paths) > 1:
+        if chart or fronts is not None or len(depths) > 1:
+            raise click.UsageError(
+                "several routes go with one --depth, and without --chart and --fronts; leave these out, or "
+                "give one route"
+            )
+        planner.plot_routes(roadmap, paths, output, depths[0] if depths else None, overrides=overrides)
+    else:
+        path = paths[0] if paths else None
+        planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts, overrides=overrides)
     say(output)
 
 
@@ -351,7 +363,7 @@ def plot(
 def describe(
     currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
 ) -> None:
-    """Say what the current files CURRENTS hold, and what the planner takes for what."""
+    """Say what the current files CURRENTS hold, and how the planner reads them."""
     from . import planner
 
     description = planner.describe(currents, [(*place, None)[:4] for place in at], dict(names))
@@ -368,7 +380,7 @@ def describe(
 @click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
 @JSON
 def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], start: Any, as_json: bool) -> None:
-    """Fly ROUTE, which somebody drew, in the water of ROADMAP; exit code 1 where a leg of it fails.
+    """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails.
 
     CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
     """
@@ -409,7 +421,7 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
     multiple=True,
     type=key_and_value,
     metavar="WHAT=COLUMN",
-    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase, called otherwise.",
+    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase: its column.",
 )
 @click.option("-o", "--output", type=FILE, help="A TOML file for the [glider] section to write.")
 @JSON
@@ -419,7 +431,9 @@ def calibrate(
     """Fit buoyancy or drag of a vehicle, and its lift, to DIVES: a CSV file of what it flew."""
     from . import planner
 
-    found = planner.calibrate(dives, output, preset=preset, columns={name: str(own) for name, own in columns})
+    found = planner.calibrate(
+        dives, output, preset=preset, columns={name: str(column) for name, column in columns}
+    )
     if as_json:
         _write_json(found.as_dict())
     else:
@@ -429,7 +443,7 @@ def calibrate(
 @cli.command()
 @click.option("--runs", type=int, help="How often each figure is measured; 5 if not given.")
 @click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
-@click.option("--only", multiple=True, metavar="PART", help="Parts, or problems of the suite; see README.")
+@click.option("--only", multiple=True, metavar="PART", help="Only these parts, or problems of the suite.")
 @click.option("--suite", is_flag=True, help="Solve the named problems instead, by every method and baseline.")
 @click.option("--ompl", type=FILE, help="With --suite: a folder for logs that OMPL's tools read.")
 @click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
@@ -445,7 +459,7 @@ def bench(
     against: Path | None,
     output: Path | None,
 ) -> None:
-    """Measure what this machine does, or how good routes are; the full run must be alone on it."""
+    """Measure what this machine does, or how good routes are; nothing else may run meanwhile."""
     from . import planner
 
     if suite:
@@ -458,12 +472,12 @@ def bench(
             ompl=ompl,
             quick=quick,
             only=only,
-            progress=lambda said: say(f"suite: {said}", error=True),
+            progress=lambda message: say(f"suite: {message}", error=True),
         )
         say(report)
         return
     if ompl is not None:
-        raise click.UsageError("--ompl goes with --suite alone; add that or leave it out")
+        raise click.UsageError("--ompl needs --suite; add it, or leave --ompl out")
     record, moved = planner.bench(
         output, against=against, runs=5 if runs is None else runs, quick=quick, only=only, ceiling=ceiling,
         progress=lambda figure: say(f"bench: {figure}", error=True),

@@ -1,6 +1,6 @@
 """An opened roadmap: roadmap, problem and searches, each made once, when it is first needed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as File
 from threading import RLock
@@ -114,6 +114,11 @@ class OpenedScenario:
         another rule. `surfacing` is a rule for how often to come up; the scenario's own if None. Exported
         windows last `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within
         `arrival_radius` [m], each vehicle's usual one if None; `notes` of the path say what else became of files.
+
+        Examples:
+            >>> path = road.query((-190, 190, 0), (100, -100, -75), thin=20)
+            >>> len(path.legs), round(path.travel_time)
+            (3, 430)
         """
         for output in outputs:
             check_export(output)
@@ -130,28 +135,55 @@ class OpenedScenario:
         return replace(path, notes=tuple(notes))
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none."""
+        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none.
+
+        Examples:
+            >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
+            array([[430., 382.]])
+        """
         free = self.planner(Surfacing())
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
     def arrivals(self, start: Point | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot.
+
+        Examples:
+            >>> int((road.arrivals() < 300).sum())
+            18
+        """
         return self.planner(Surfacing()).arrivals(None if start is None else self._point(start))
 
     def trade_off(
         self, start: Point | None = None, goal: Point | None = None, *, surfacing: Surfacing | None = None
     ) -> TradeOff:
-        """Every path of one query that no other beats both in time and in energy; all else as in `query`."""
+        """Every path of one query that no other beats both in time and in energy; all else as in `query`.
+
+        Examples:
+            >>> energy = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
+            >>> [len(path.legs) for path in glider_stream.open(energy).trade_off().paths]
+            [4]
+        """
         return front(self.planner(surfacing), self._ends(start, goal))
 
     def card(self, path: Path) -> Card:
-        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
+        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+
+        Examples:
+            >>> print(road.card(road.query()))  # doctest: +ELLIPSIS
+            leg   hours  over ground ...
+            ...
+        """
         return card_of(path, self.problem)
 
     def score(self, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
         """Fly a drawn route (CSV, GeoJSON, KML, GPX, a path file, goto lists, targets) in the roadmap's water.
 
         Several files are one route, one after another. `start` is where the vehicle is, before its first point.
+
+        Examples:
+            >>> _ = road.query(outputs=["path.json"])
+            >>> road.score("path.json").flyable
+            True
         """
         files = [route] if isinstance(route, str | File) else list(route)
         drawn = [read_drawn(file) for file in files]
@@ -234,6 +266,9 @@ class OpenedScenario:
         A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path
         by time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written
         where `output` says; one that ends in .html is a page to look around in, and no figure is returned.
+
+        Examples:
+            >>> figure = road.plot(road.query(), "route.png", depths=[0, 75])
         """
         from .plot.draw import check_drawing, draw_roadmap, draw_route
 
@@ -248,11 +283,44 @@ class OpenedScenario:
         how = output, depths, chart, fronts, free.arrivals
         return draw_route(self.position, self.problem, route, *how, self.title)
 
+    def plot_routes(
+        self,
+        paths: Sequence[str | File] | Mapping[str, Path],
+        output: str | File | None = None,
+        depth: float | None = None,
+    ) -> "Figure":
+        """Draw two to four paths of this water side by side, with their times, over the current at a `depth` [m].
+
+        `paths` are path files, which are called by their names without the ending, or paths by name. Without
+        a `depth` the middle of the box is drawn. The figure is written where `output` says.
+
+        Examples:
+            >>> paths = {"near": road.query(goal=(0, 0, -150)), "far": road.query()}
+            >>> figure = road.plot_routes(paths, "routes.png", depth=75)
+        """
+        from .plot.draw import check_drawing, draw_routes
+
+        check_drawing(output, None, None, False, None)
+        routes = (
+            dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_path(path) for path in paths}
+        )
+        named = f"each path needs a name of its own; got {', '.join(map(str, paths))}; rename a file"
+        require(len(routes) == len(paths), named)
+        self.planner(Surfacing())  # which compares the water with the roadmap's
+        return draw_routes(self.position, self.problem, routes, output, depth)
+
 
 class OpenedRoadmap(OpenedScenario):
     """A roadmap and what its questions need, as `OpenedScenario`; `roadmap` is its data.
 
     InputError at the first question where flow, terrain or glider are no longer those that it was built with.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> road.query().found
+        True
+        >>> road.problem is road.problem
+        True
     """
 
     def __init__(self, roadmap: Roadmap, title: str = "") -> None:
@@ -275,7 +343,12 @@ class OpenedRoadmap(OpenedScenario):
         return self.roadmap.position
 
     def why_no_edges(self) -> str:
-        """Why it holds no edge, in a sentence; empty where it holds some."""
+        """The reason, in a sentence, if the roadmap has no edge; empty if it has some.
+
+        Examples:
+            >>> road.why_no_edges()
+            ''
+        """
         return "" if self.roadmap.target.size else no_edges(self.roadmap, self.problem)
 
     def __str__(self) -> str:
@@ -289,6 +362,12 @@ def open(roadmap: str | File | Roadmap | OpenedRoadmap, overrides: Sequence[str]
     beside the roadmap is found without.
 
     InputError where the file is not a roadmap, newer, incomplete or damaged.
+
+    Examples:
+        >>> road = glider_stream.open("small.h5")
+        >>> print(road)  # doctest: +ELLIPSIS
+        Roadmap: 77 nodes, 929 edges
+        ...
     """
     if overrides:
         before = open(roadmap)

@@ -62,6 +62,11 @@ def build(
     every `checkpoint` [s], 30 if None, the disk is asked to keep what was found. `scheduler` is the address
     of a Dask scheduler, or "local:N", whose workers evaluate; `base` an older roadmap of the same nodes in
     another current, of which what that cannot have touched is taken over.
+
+    Examples:
+        >>> road = planner.build("small.toml", "built.h5", overrides=["neighbours.k=10"])
+        >>> road.position.shape, road.target.size > 300
+        ((77, 3), True)
     """
     resolved = _resolved(scenario, output, overrides)
     if output is None:
@@ -86,7 +91,14 @@ def build_part(
     base: str | File | Roadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> None:
-    """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; else as `build`."""
+    """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; see `build` for the rest.
+
+    Examples:
+        >>> for shard in ("1/2", "2/2"):
+        ...     planner.build_part("small.toml", f"part{shard[0]}.h5", shard)
+        >>> planner.merge(["part1.h5", "part2.h5"], "whole.h5").target.size
+        929
+    """
     resolved = _resolved(scenario, output, overrides)
     _build(resolved, output, threads, progress, shard, restart, checkpoint, scheduler, base)
 
@@ -136,18 +148,38 @@ def _resolved(scenario: str | File | Scenario, output: str | File | None, overri
 
 
 def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
-    """One roadmap of the parts that builds with `shard` wrote."""
+    """Make one roadmap of parts that `build_part` wrote.
+
+    Examples:
+        >>> for shard in ("1/2", "2/2"):
+        ...     planner.build_part("small.toml", f"part{shard[0]}.h5", shard, restart=True)
+        >>> whole = planner.merge(["part1.h5", "part2.h5"], "merged.h5")
+        >>> planner.differ(whole, "small.h5").same_edges
+        True
+    """
     merge_parts(parts, output)
     return read_roadmap(output)
 
 
 def info(roadmap: AnyRoadmap) -> Roadmap:
-    """A roadmap from its file; printed, it says what it is."""
+    """A roadmap from its file, which can be printed.
+
+    Examples:
+        >>> print(planner.info("small.h5"))  # doctest: +ELLIPSIS
+        Roadmap: 77 nodes, 929 edges
+        ...
+    """
     return open_roadmap(roadmap).roadmap
 
 
 def differ(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
-    """What two roadmaps differ in; printed, it says so."""
+    """The differences between two roadmaps, which can be printed.
+
+    Examples:
+        >>> fewer = planner.build("small.toml", overrides=["neighbours.k=10"])
+        >>> planner.differ("small.h5", fewer).same_edges
+        False
+    """
     return difference(info(first), info(second))
 
 
@@ -163,9 +195,14 @@ def query(
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
 ) -> Path:
-    """The cheapest path between two points, as `OpenedRoadmap.query` has it.
+    """The cheapest path between two points, see `OpenedRoadmap.query`.
 
     For several questions open the roadmap once: `glider_stream.open`.
+
+    Examples:
+        >>> path = planner.query("small.h5", goal=(100, -100, -75), outputs=["path.json", "path.csv"])
+        >>> len(path.legs), round(path.travel_time)
+        (3, 430)
     """
     for output in outputs:
         check_export(output)  # before the roadmap is read
@@ -194,7 +231,13 @@ def plan(
     *,
     overrides: Sequence[str] = (),
 ) -> Path:
-    """The cheapest path of a scenario without a roadmap; all else as in `query`."""
+    """The cheapest path of a scenario without a roadmap; all else as in `query`.
+
+    Examples:
+        >>> path = planner.plan("small.toml", (-190, 190, 0), (100, -100, -75))
+        >>> path.found
+        True
+    """
     for output in outputs:
         check_export(output)
     return open_scenario(scenario, overrides).query(
@@ -214,29 +257,61 @@ def trade_off(
     goal: Point | None = None,
     surfacing: Surfacing | None = None,
 ) -> TradeOff:
-    """Every path of one query that no other beats both in time and in energy; all else as in `query`."""
+    """Every path of one query that no other beats both in time and in energy; all else as in `query`.
+
+    Examples:
+        >>> road = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
+        >>> [len(path.legs) for path in planner.trade_off(road).paths]
+        [4]
+    """
     return open_roadmap(roadmap).trade_off(start, goal, surfacing=surfacing)
 
 
 def card(roadmap: AnyRoadmap, path: Path) -> Card:
-    """What a route of this roadmap makes over ground, leg by leg, and what the water does to it."""
+    """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+
+    Examples:
+        >>> path = planner.query("small.h5")
+        >>> len(planner.card("small.h5", path).legs)
+        4
+    """
     return open_roadmap(roadmap).card(path)
 
 
 def score(
     roadmap: AnyRoadmap | Scenario, route: str | File | Sequence[str | File], start: Point | None = None
 ) -> Score:
-    """Fly a drawn route, from one file or several, in a roadmap's water, as `OpenedRoadmap.score` has it."""
+    r"""Fly a drawn route, from one file or several, in a roadmap's water, as `OpenedRoadmap.score` has it.
+
+    Examples:
+        >>> _ = pathlib.Path("drawn.csv").write_text("x,y,z\n-190,190,0\n-100,100,-75\n0,0,-150\n")
+        >>> score = planner.score("small.h5", "drawn.csv")
+        >>> score.flyable, len(score.legs)
+        (True, 2)
+
+    """
     return open_either(roadmap).score(route, start)
 
 
 def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
-    """What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets."""
+    r"""What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets.
+
+    Examples:
+        >>> _ = pathlib.Path("goto_l10.ma").write_text("behavior_name=goto_list\n")
+        >>> (linted,) = planner.lint(["goto_l10.ma"])
+        >>> len(linted.faults) > 0
+        True
+    """
     return [lint_file(file, most_waypoints) for file in files]
 
 
 def why_no_edges(roadmap: AnyRoadmap) -> str:
-    """Why a roadmap holds no edge, in a sentence; empty where it holds some."""
+    """The reason, in a sentence, if a roadmap has no edge; empty if it has some.
+
+    Examples:
+        >>> planner.why_no_edges("small.h5")
+        ''
+    """
     return open_roadmap(roadmap).why_no_edges()
 
 
@@ -244,6 +319,10 @@ def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] =
     """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too.
 
     `overrides` as `glider_stream.open` has them.
+
+    Examples:
+        >>> planner.verify("small.h5", sample=5).holds
+        True
     """
     from .roadmap.verify import verify
 
@@ -251,9 +330,13 @@ def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] =
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where there is none.
+    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where no path exists.
 
     Points are given in the coordinates of the scenario's domain; see `query`.
+
+    Examples:
+        >>> planner.table("small.h5", [(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
+        array([[430., 382.]])
     """
     return open_roadmap(roadmap).table(starts, goals)
 
@@ -268,11 +351,34 @@ def plot(
     fronts: float | None = None,
     overrides: Sequence[str] = (),
 ) -> "Figure | None":
-    """Draw a path over its roadmap or scenario, or the roadmap, as `OpenedRoadmap.plot` has it."""
+    """Draw a path over its roadmap or scenario, or the roadmap, as `OpenedRoadmap.plot` has it.
+
+    Examples:
+        >>> path = planner.query("small.h5")
+        >>> figure = planner.plot("small.h5", path, "chart.png", chart=True)
+        >>> planner.plot("small.h5", path, "page.html")
+    """
     from .plot.draw import check_drawing
 
     check_drawing(output, path, depths, chart, fronts)  # before the roadmap is read
     return open_either(roadmap, overrides).plot(path, output, depths, chart=chart, fronts=fronts)
+
+
+def plot_routes(
+    roadmap: AnyRoadmap,
+    paths: Sequence[str | File] | Mapping[str, Path],
+    output: str | File | None = None,
+    depth: float | None = None,
+    *,
+    overrides: Sequence[str] = (),
+) -> "Figure":
+    """Draw two to four paths of one problem side by side; see `OpenedRoadmap.plot_routes`.
+
+    Examples:
+        >>> paths = {"near": planner.query("small.h5", goal=(0, 0, -150)), "far": planner.query("small.h5")}
+        >>> figure = planner.plot_routes("small.h5", paths, "routes.png")
+    """
+    return open_roadmap(roadmap, overrides).plot_routes(paths, output, depth)
 
 
 def plot_steering(
@@ -286,6 +392,9 @@ def plot_steering(
     """Draw how legs are found from one point: its flow map at the goal's depth, and what each method finds.
 
     Points are in the coordinates of the scenario's domain; any method may be chosen there.
+
+    Examples:
+        >>> figure = planner.plot_steering("small.toml", (-190, 190, 0), (0, 0, -150), "steering.png")
     """
     from .plot import check_figure, plot_steering, save_figure
 
@@ -312,6 +421,14 @@ def describe(
 
     A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None where there is but one.
     `names` says what the files do not. InputError where they cannot be used.
+
+    Examples:
+        >>> description = planner.describe("currents.nc", at=[(18.5, 38.0, 100.0, None)])
+        >>> print(description)  # doctest: +ELLIPSIS
+        currents.nc
+          u           uo (standard_name eastward_sea_water_velocity, m s-1)
+        ...
+          18.5, 38, 100 m: +0.07905 m/s east, -0.03942 m/s north
     """
     from .water.describe import describe
 
@@ -325,7 +442,13 @@ def calibrate(
     preset: str = "seaglider",
     columns: Mapping[str, str] | None = None,
 ) -> "Calibration":
-    """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says."""
+    """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says.
+
+    Examples:
+        >>> calibration = planner.calibrate("dives.csv", "glider.toml")
+        >>> sorted(calibration.parameters)
+        ['climb_buoyancy', 'dive_buoyancy']
+    """
     from .vehicle.calibration.calibrate import calibrate
     from .vehicle.calibration.dives import read_dives
 
@@ -353,6 +476,11 @@ def bench(
     The parts named in `only`, all if none, each figure `runs` times; `quick` measures small problems, to see
     that all of it runs. `ceiling` is a program that the raw integrator is measured in turns with. Written as
     JSON where `output` says.
+
+    Examples:
+        >>> record, moved = planner.bench("record.json", runs=1, quick=True, only=["integrator"])
+        >>> [figure.name for figure in record.figures], moved
+        (['evaluations_per_s'], [])
     """
     from .evaluation.bench import bench, read_record, write_record
 
@@ -378,6 +506,12 @@ def suite(
 
     `pairs` random queries each; `quick`: few of all. Written as JSON where `output` says; a log per problem,
     as OMPL's tools read them, into the folder `ompl`.
+
+    Examples:
+        >>> planner.suite(only=["atlantis"])  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        glider_stream.base.errors.InputError: ...atlantis...
     """
     from .evaluation.bench import write_record
     from .evaluation.suite import ompl_log, run_suite

@@ -91,7 +91,13 @@ class QueryPoints:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One block each; `text` is the resolved TOML."""
+    """A problem as the TOML file describes it: one object for each section; `text` is the resolved TOML.
+
+    Examples:
+        >>> scenario = glider_stream.read_scenario("seed-box")
+        >>> scenario.query.start, scenario.sampler
+        ((-450.0, 450.0, 0.0), GridSampler(shape=(16, 16, 4)))
+    """
 
     domain: BoxDomain | GeographicDomain
     flow: AnalyticFlow | OceanFlow
@@ -110,7 +116,7 @@ class Scenario:
         lo, hi = self.domain.box()
         table, frame = polar(self.glider), self.domain.frame()
         horizon = self.integration.dt * self.integration.steps
-        flow, terrain, words = self._waters(float(table.best_horizontal.max()) * horizon, horizon)
+        flow, terrain, text = self._waters(float(table.best_horizontal.max()) * horizon, horizon)
         known = flow.extent
         times = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
         within = known.t_lo <= self.departure <= known.t_hi
@@ -118,15 +124,15 @@ class Scenario:
         fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {known.max_speed:g}; mend [flow]"
         require(known.max_speed <= FASTEST, fast)
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
-        words += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
+        text += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
-            words += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
+            text += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
         sampler = self.sampler
         if isinstance(sampler, YoSampler):
             sampler = sampler.for_glide(float(table.best_angle.max()))
         if frame is not None and isinstance(self.domain, GeographicDomain):
             error = frame.scale_error(self.domain.lon, self.domain.lat)
-            words += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
+            text += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
         return Problem(
             evaluator=Evaluator(flow, terrain, table, self.method, self.integration, self.cost),
             sampler=sampler,
@@ -137,7 +143,7 @@ class Scenario:
             start=None if self.query is None else self.domain.point(self.query.start),
             goal=None if self.query is None else self.domain.point(self.query.goal),
             scenario=self.text,
-            flow_words=words,
+            flow_words=text,
             glider_words=str(self.glider),
             to_lonlat=None if frame is None else lambda at: np.stack(frame.to_lonlat(*at[:, :2].T), axis=-1),
             departs=self._departs(),
@@ -167,11 +173,11 @@ class Scenario:
             )
             assert isinstance(self.domain, GeographicDomain)
             domain, frame = self.domain, self.domain.frame()
-            ocean, bottom, said = self.flow.waters(frame, domain.lon, domain.lat, domain.depth)
+            ocean, bottom, description = self.flow.waters(frame, domain.lon, domain.lat, domain.depth)
             known = ocean.extent
             rim = np.array([known.x_lo, known.y_lo]), np.array([known.x_hi, known.y_hi])
             seabed, also = self._grounds(rim, [bottom])
-            return ocean, seabed, f"{said}; {also}"
+            return ocean, seabed, f"{description}; {also}"
         lo, hi = self.domain.box()
         flow = self.flow.kernel((lo[2], hi[2]))
         if self.flow.sampled is not None:
@@ -179,7 +185,7 @@ class Scenario:
             stray = (glide + flow.extent.max_speed * horizon) / 2
             x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
             exact, flow = flow, sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
-        words = next(name for name, one in FLOWS.items() if one is type(self.flow))
+        text = next(name for name, kind in FLOWS.items() if kind is type(self.flow))
         if self.flow.sampled is not None:
             known = flow.extent
             box = (
@@ -188,20 +194,20 @@ class Scenario:
             )
             off = sampling_error(exact, flow, *box, (lo[2], hi[2]))
             spacing = ", ".join(f"{step:g}" for step in self.flow.sampled)
-            words += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
+            text += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
         if self.terrain == TerrainSettings():
-            return flow, OpenWater(-np.inf), words
+            return flow, OpenWater(-np.inf), text
         if self.terrain == TerrainSettings(max_depth=self.terrain.max_depth):
-            return flow, OpenWater(-float(self.terrain.max_depth or np.inf)), words
+            return flow, OpenWater(-float(self.terrain.max_depth or np.inf)), text
         wide = (glide + flow.extent.max_speed * horizon) / 2
         seabed, also = self._grounds((lo[:2] - wide, hi[:2] + wide), [])
-        return flow, seabed, f"{words}; {also}"
+        return flow, seabed, f"{text}; {also}"
 
     def _grounds(self, box: tuple[Array, Array], bottoms: list[Bottom]) -> tuple[Seabed, str]:
         """The terrain of a geographic domain over a box [m], of what is known and what is asked for."""
         require(
             isinstance(self.domain, GeographicDomain),
-            "[terrain] needs a domain in `lon`, `lat` and `depth`, but for `max_depth`; got x, y, z",
+            "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
         )
         assert isinstance(self.domain, GeographicDomain)
         domain, frame, asked = self.domain, self.domain.frame(), self.terrain
@@ -210,13 +216,18 @@ class Scenario:
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
-            words = asked.variable, asked.positive, asked.names
-            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *words)]
+            text = asked.variable, asked.positive, asked.names
+            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *text)]
         return raster_terrain(asked, frame, *box, bottoms, domain.box())
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package, by name."""
+    """The scenarios that come with the package, by name.
+
+    Examples:
+        >>> "seed-box" in glider_stream.shipped_scenarios()
+        True
+    """
     folder = Path(str(files("glider_stream"))) / "data"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -225,14 +236,22 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """A scenario from a TOML file, or a shipped one by its name.
 
     `overrides` are section.key=value each. Where they choose another kind of a section, the keys of the old
-    kind that the new one does not know are dropped, but for those overridden themselves. File names in the
+    kind that the new one does not know are dropped, unless they are overridden, too. File names in the
     scenario are relative to its folder, in overrides to the working directory.
+
+    Examples:
+        >>> scenario = glider_stream.read_scenario("seed-box", ["steering.method=flow-map"])
+        >>> scenario.domain.z
+        (-300.0, 0.0)
     """
     path = Path(name)
     if not path.is_file() and str(name) in shipped_scenarios():
         path = shipped_scenarios()[str(name)]
     shipped = ", ".join(shipped_scenarios())
-    require(path.is_file(), f"the scenario {name} is no file, and none of those shipped: {shipped}")
+    require(
+        path.is_file(),
+        f"the scenario {name} is neither a file nor a shipped scenario; choose a file, or one of: {shipped}",
+    )
     try:
         # some editors begin a file with a byte order mark
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
@@ -365,6 +384,6 @@ def _set(table: dict[str, Any], override: str) -> list[str]:
     for key in keys[:-1]:
         table = table.setdefault(key, {})
         section = isinstance(table, dict)
-        require(section, f"`--set` takes section.key=value, and `{key}` is no section; got {override!r}")
+        require(section, f"`--set` takes section.key=value, and `{key}` is not a section; got {override!r}")
     table[keys[-1]] = value
     return keys

@@ -206,8 +206,8 @@ SETS = {
     "no key": ("neighbours.=5", "section.key=value; got 'neighbours.=5'"),
     "nothing": ("", "section.key=value; got ''"),
     "two lines": ("neighbours.k=5\nflow.x=3", "section.key=value; got 'neighbours.k=5\\nflow.x=3'"),
-    "a key below a value": ("neighbours.k.l=5", "`k` is no section; got 'neighbours.k.l=5'"),
-    "a key below a list": ("flow.vortex.x=5", "`vortex` is no section"),
+    "a key below a value": ("neighbours.k.l=5", "`k` is not a section; got 'neighbours.k.l=5'"),
+    "a key below a list": ("flow.vortex.x=5", "`vortex` is not a section"),
     "an unknown section": ("sea.k=5", "the section `sea` is not known; choose from: flow"),
     "an unknown key": ("neighbours.kk=5", "`neighbours.kk` is not known; choose from: k"),
     "an empty value": ("neighbours.k=", "`neighbours.k` must be", "got ''"),
@@ -218,7 +218,7 @@ SETS = {
     "a whole section": ("sampling={kind='sobol'}", "section.key=value"),
     "more than any memory": (
         "sampling.shape=[9000000000,90000000,9]",
-        "is 7,290,000,000,000,000,000 nodes",
+        "7,290,000,000,000,000,000 nodes",
         "take at most 10,000,000",
     ),
     "a file for a flow that has none": ("flow.file=a.nc", "`flow.file` is not known"),
@@ -565,7 +565,7 @@ def test_standard_output_that_takes_nothing(place):
     assert_refused((code, "", err), "standard output cannot be used: no space left on device")
     reader, writer = os.pipe()
     os.close(reader)
-    assert run_with({}, "info", "road.h5", stdout=writer) == (141, None, "")  # as a shell has it
+    assert run_with({}, "info", "road.h5", stdout=writer) == (141, None, "")  # as a shell says of a broken pipe
     os.close(writer)
 
 

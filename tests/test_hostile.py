@@ -262,21 +262,21 @@ def test_links_are_not_followed(good, tmp_path):
     with h5py.File(tmp_path / "road.h5", "r+") as file:
         del file["nodes/position"]
         file["nodes/position"] = h5py.ExternalLink("other.h5", "/nodes/position")
-    with pytest.raises(InputError, match=r"links to another file at `position`, which is not followed"):
+    with pytest.raises(InputError, match=r"links to another file at `position`, and the link is not followed"):
         read_roadmap(tmp_path / "road.h5")
     shutil.copy(good / "four.nc", tmp_path / "four.nc")
     (tmp_path / "raw").write_bytes(bytes(3 * 10 * 10 * 8))
     with h5py.File(tmp_path / "four.nc", "r+") as file:
         del file["uo"]
         file.create_dataset("uo", (3, 10, 10), "f8", external=[("raw", 0, 2400)])
-    with pytest.raises(InputError, match=r"`uo` in .*four.nc lie in other files, not followed"):
+    with pytest.raises(InputError, match=r"`uo` in .*four.nc lie in other files, which are not read"):
         load_currents(tmp_path / "four.nc")
     with h5py.File(tmp_path / "four.nc", "r+") as file:
         del file["uo"]
         layout = h5py.VirtualLayout((3, 10, 10), "f8")
         layout[:] = h5py.VirtualSource("other.nc", "uo", (3, 10, 10))
         file.create_virtual_dataset("uo", layout)
-    with pytest.raises(InputError, match="not followed"):
+    with pytest.raises(InputError, match="which are not read"):
         load_currents(tmp_path / "four.nc")
 
 

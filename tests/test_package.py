@@ -13,12 +13,16 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from helpers.ionian import write_ionian
 from helpers.small import command
+
+import glider_stream
+from glider_stream.roadmap.store import VERSION
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 FENCE = re.compile(r"^```(python|sh|console)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-ELSEWHERE = {"pip", "git", "cd", "copernicusmarine"}
+ELSEWHERE = {"pip", "git", "cd", "copernicusmarine", "python3", "."}
 """Programs whose lines are taken on trust."""
 
 
@@ -61,7 +65,7 @@ def test_the_installed_package_is_whole(tmp_path):
 
 def test_the_installed_metadata():
     said = importlib.metadata.metadata("glider-stream")
-    assert said["Version"] == PROJECT["project"]["version"]
+    assert glider_stream.__version__ == said["Version"] == PROJECT["project"]["version"]
     assert said["Requires-Python"] == PROJECT["project"]["requires-python"]
     scripts = importlib.metadata.entry_points(group="console_scripts")
     assert scripts["glider-stream"].value == PROJECT["project"]["scripts"]["glider-stream"]
@@ -98,11 +102,69 @@ def test_mypy():
     run("-m", "mypy")
 
 
+def test_ruff_is_pinned_to_what_runs():
+    """Another version formats otherwise: the pin, the hooks and the checks must be one."""
+    pins = [need for need in PROJECT["project"]["optional-dependencies"]["test"] if need.startswith("ruff")]
+    assert pins == [f"ruff=={importlib.metadata.version('ruff')}"]
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text()
+    assert re.findall(r"entry: python -m (\w+)", hooks) == ["ruff", "ruff", "mypy"]
+
+
+def test_the_workflow_calls_targets_and_supported_versions():
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text()
+    assert set(re.findall(r"run: make (\S+)", workflow)) == {"lint", "types", "docs", "test"}
+    assert set(re.findall(r"run: make (\S+)", workflow)) <= targets((ROOT / "Makefile").read_text())
+    (tested,) = re.findall(r"python: \[(.*)\]", workflow)
+    stated = [c.rsplit(" ", 1)[1] for c in PROJECT["project"]["classifiers"] if "Python :: 3." in c]
+    assert [version.strip('"') for version in tested.split(", ")] == stated
+    assert PROJECT["project"]["requires-python"] == f">={stated[0]}"
+
+
 # what is documented
 
 
 def documents():
-    return [path for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))) if path.exists()]
+    return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text().split()) <= 600
+
+
+def test_links_lead_to_files():
+    for document in (*documents(), ROOT / "CHANGELOG.md"):
+        for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text()):
+            if "://" not in link:
+                assert (document.parent / link).exists(), f"{document.name}: {link}"
+
+
+def test_readme_lists_all_documents():
+    readme = (ROOT / "README.md").read_text()
+    for page in (ROOT / "docs").glob("*.md"):
+        assert page.name == "index.md" or f"](docs/{page.name})" in readme, page.name
+
+
+def test_the_reference_has_all_that_is_public():
+    shown = {
+        name.rsplit(".", 1)[1] for name in re.findall(r"^::: (\S+)", (ROOT / "docs/api.md").read_text(), re.M)
+    }
+    assert shown == {"planner", *glider_stream.__all__} - {"__version__"}
+
+
+def test_the_changelog_names_this_version_and_the_roadmap_format():
+    text = (ROOT / "CHANGELOG.md").read_text()
+    newest = text.split("\n## ")[1]
+    assert newest.startswith(("[Unreleased]", f"[{glider_stream.__version__}]"))
+    assert f"Roadmap format {VERSION}." in newest
+
+
+def test_the_site_is_built_without_a_warning(tmp_path):
+    run("-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", tmp_path / "site")
+    page = (tmp_path / "site" / "api" / "index.html").read_text()
+    for name in ("build", "query", "table", "plot_routes"):
+        assert f'id="glider_stream.planner.{name}"' in page
+    for name in set(glider_stream.__all__) - {"__version__"}:
+        assert re.search(rf'id="glider_stream\.[\w.]*{name}"', page), name
 
 
 def blocks(text):
@@ -139,6 +201,8 @@ def test_blocks_are_found():
 def test_the_documents_run(document, tmp_path, monkeypatch, capsys):
     """All blocks of a document, one after the other, in one folder."""
     monkeypatch.chdir(tmp_path)
+    if "currents.nc" in document.read_text():
+        write_ionian(tmp_path / "currents.nc")
     for language, block in blocks(document.read_text()):
         if language == "python":
             exec(compile(block, document.name, "exec"), {"__name__": "__main__"})

@@ -30,7 +30,7 @@ ROUTES = {
     "washington": [
         f"flow.file={WASHINGTON}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-125.9,-125.5]",
         "domain.lat=[46.8,47.9]", "sampling.shape=[26,98,2]", "query.start=[-125.6,46.9,0.0]",
-        "query.goal=[-125.6,47.85,0.0]",
+        "query.goal=[-125.6,47.85,0.0]", "query.frozen=true",
     ],
 }  # fmt: skip
 

@@ -5,13 +5,13 @@ from .settings import require
 Range = tuple[float, float]
 
 LONGEST = 1e9
-"""The longest time [s] that a scenario may speak of: beyond, clocks lose their microseconds."""
+"""The longest time [s] that a scenario may name: clocks cannot show microseconds beyond it."""
 
 WIDEST = 1e9
-"""Longest side of a box [m]."""
+"""The longest side [m] that a box may have."""
 
 FASTEST = 100.0
-"""Greatest current [m/s] that is taken for one."""
+"""The greatest speed [m/s] that can be a current; anything faster is an error of the input."""
 
 
 def check_range(bounds: Range, where: str) -> None:

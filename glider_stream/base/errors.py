@@ -1,8 +1,16 @@
-"""What can go wrong that is not a bug."""
+"""Errors that are not bugs."""
 
 
 class InputError(ValueError):
-    """Unusable input; the message is one sentence that names the value received and the cure."""
+    """Unusable input; the message is one sentence that names the value received and the cure.
+
+    Examples:
+        >>> try:
+        ...     glider_stream.read_scenario("seed-bx")
+        ... except glider_stream.InputError as error:
+        ...     print(error)  # doctest: +ELLIPSIS
+        the scenario seed-bx ...
+    """
 
 
 class InputWarning(UserWarning):
@@ -14,4 +22,4 @@ class Unwritable(InputError):
 
 
 class Stopped(KeyboardInterrupt):
-    """Work that was interrupted from the keyboard; the message says what is kept, and how to go on."""
+    """Work was interrupted from the keyboard; the message says what is kept, and how to continue."""

@@ -32,7 +32,7 @@ def check_output(path: str | Path) -> None:
         raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
     require(not path.is_dir(), f"the output {path} is a folder; name a file")
     # a device such as /dev/null would be replaced by a file
-    require(path.is_file() or not path.exists(), f"the output {path} is no ordinary file; name another")
+    require(path.is_file() or not path.exists(), f"the output {path} is not an ordinary file; name another")
     require(path.parent.is_dir(), f"the output folder {path.parent} does not exist; make it first")
     try:
         tempfile.TemporaryFile(dir=path.resolve().parent).close()
@@ -56,7 +56,7 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         with temporary.open("rb") as whole:
             os.fsync(whole.fileno())
-        # mkstemp makes files for their owner alone; an output is as readable as any new file
+        # only the owner may read what mkstemp makes; an output is as readable as any new file
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)

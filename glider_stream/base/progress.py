@@ -30,10 +30,10 @@ def reporter(what: str) -> Iterator[Callable[[Any], None]]:
     from rich.progress import BarColumn, Progress, TextColumn
 
     console = Console(file=cast(IO[str], Murmur()))
-    with Progress(TextColumn(what), BarColumn(), TextColumn("{task.fields[said]}"), console=console) as bar:
-        task = bar.add_task(what, said="compiling")
+    with Progress(TextColumn(what), BarColumn(), TextColumn("{task.fields[state]}"), console=console) as bar:
+        task = bar.add_task(what, state="compiling")
 
         def update(progress: Any) -> None:
-            bar.update(task, completed=progress.done, total=progress.total, said=str(progress))
+            bar.update(task, completed=progress.done, total=progress.total, state=str(progress))
 
         yield update

@@ -1,4 +1,4 @@
-"""Frozen settings objects out of TOML tables: every key checked, none guessed.
+"""Frozen settings objects made from TOML tables: every key is checked, and no value is guessed.
 
 A block of a scenario is a frozen dataclass: a field without a default is a required key, its annotation is
 the key's type, its `__post_init__` checks the value. A new kind is one dataclass and one table row.
@@ -16,7 +16,7 @@ from .errors import InputError
 T = TypeVar("T")
 LARGEST_FLOAT = sys.float_info.max
 LARGEST_INT = 2**53
-"""Whole numbers up to here are exact as floats, too; TOML knows no limit."""
+"""Whole numbers up to this one are exact as floats, too; TOML has no limit."""
 
 
 def _described(kind: Any) -> str:
@@ -88,7 +88,7 @@ def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
 
 
 def from_kinds(kinds: Mapping[str, type[T]], table: Mapping[str, Any], where: str, selector: str = "kind") -> T:
-    """As `from_table`, the class chosen by the key `selector`."""
+    """An object of the class that the key `selector` chooses, made from the other keys by `from_table`."""
     rest = dict(table)
     if selector not in rest:
         raise InputError(f"`{where}.{selector}` is missing: choose from: {', '.join(sorted(kinds))}")

@@ -44,7 +44,7 @@ class Murmur:
     encoding = "utf-8"
 
     def __init__(self) -> None:
-        """The stream of this moment: a live bar puts one of its own in its place, which writes here."""
+        """Standard error as it is now: a live bar puts itself in its place, and writes here."""
         self._stream = sys.stderr
 
     def write(self, text: str) -> int:

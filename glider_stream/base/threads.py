@@ -1,4 +1,4 @@
-"""Threads: kernels without the interpreter's lock, a few items at a time, whoever is free takes the next."""
+"""Threads: kernels run without the interpreter's lock; each free thread takes the next few items."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +32,7 @@ def threads(count: int | None) -> Iterator[int]:
 def in_parallel(kernel: Callable[[int, int], object], count: int, at_once: int) -> None:
     """Call `kernel(first, last)` until 0..count - 1 are done, `at_once` of them in a call.
 
-    The kernel writes to rows of its own items alone, so that neither the threads nor `at_once` change a bit.
+    The kernel only writes to the rows of its items, so that results depend neither on threads nor on `at_once`.
     """
     spans = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
     workers = min(_COUNT.get() or usable_cores(), len(spans))

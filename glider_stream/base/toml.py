@@ -31,8 +31,8 @@ def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
     for key, value in table.items():
         if isinstance(value, Mapping):
             below.append(f"[{prefix}{key}]\n{to_toml(value, f'{prefix}{key}.')}")
-        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            below.extend(f"[[{prefix}{key}]]\n{to_toml(one, f'{prefix}{key}.')}" for one in value)
+        elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+            below.extend(f"[[{prefix}{key}]]\n{to_toml(item, f'{prefix}{key}.')}" for item in value)
         else:
             lines.append(f"{key} = {_toml_value(value)}\n")
     return "".join(lines) + "".join(below)
@@ -44,6 +44,6 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, (int, float)):
         return repr(value)
     if isinstance(value, list):
-        return "[" + ", ".join(_toml_value(one) for one in value) + "]"
-    # JSON escapes as TOML does, but for one character
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    # JSON escapes like TOML, except for one character
     return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")

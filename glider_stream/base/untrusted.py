@@ -1,4 +1,4 @@
-"""Untrusted HDF5, and other packed files: what may not be followed, nor believed, before anything is read."""
+"""Checks of packed files that may come from anyone, such as HDF5, before their data are read."""
 
 import math
 import stat
@@ -10,9 +10,9 @@ import h5py
 from .settings import require
 
 MOST_RATIO = 1100
-"""Deflate packs no better than 1032 to 1: data that claim more than that of their file are none."""
+"""Deflate packs at most 1032 to 1. A file that claims more data than this for its size is damaged."""
 FREE = 50_000_000
-"""Claims up to this size [bytes] need no proof."""
+"""A claim up to this size [bytes] is not compared with the size of the file."""
 MOST_OBJECTS = 10_000
 """No current file and no roadmap holds as many groups and datasets."""
 
@@ -49,20 +49,26 @@ def check_links(path: str | Path) -> None:
             for name in group:
                 link = group.get(name, getlink=True)
                 within = not isinstance(link, h5py.ExternalLink)
-                require(within, f"{path} links to another file at `{name}`, which is not followed: copy it in")
+                require(
+                    within,
+                    f"{path} links to another file at `{name}`, and the link is not followed: copy the data in",
+                )
                 if isinstance(link, h5py.SoftLink):
                     continue
-                one = group.get(name)
-                if one is None or one.id in seen:
+                item = group.get(name)
+                if item is None or item.id in seen:
                     continue
-                seen.add(one.id)
+                seen.add(item.id)
                 require(len(seen) <= MOST_OBJECTS, f"{path} holds more than {MOST_OBJECTS:,} objects; cut it")
-                if isinstance(one, h5py.Group):
-                    waiting.append(one)
-                elif isinstance(one, h5py.Dataset):
-                    own = not one.external and not one.is_virtual
-                    require(own, f"the data of `{name}` in {path} lie in other files, not followed: copy them in")
-                    _check_storage(path, str(one.name).lstrip("/"), one)
+                if isinstance(item, h5py.Group):
+                    waiting.append(item)
+                elif isinstance(item, h5py.Dataset):
+                    inside = not item.external and not item.is_virtual
+                    require(
+                        inside,
+                        f"the data of `{name}` in {path} lie in other files, which are not read: copy them in",
+                    )
+                    _check_storage(path, str(item.name).lstrip("/"), item)
 
 
 def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
@@ -79,10 +85,10 @@ def groups_of(path: str | Path) -> tuple[list[str], set[str]]:
     every: list[str] = []
     grids: set[str] = set()
 
-    def look(name: str, one: object) -> None:
-        if isinstance(one, h5py.Group):
+    def look(name: str, item: object) -> None:
+        if isinstance(item, h5py.Group):
             every.append(name)
-        elif isinstance(one, h5py.Dataset) and one.ndim >= 2:
+        elif isinstance(item, h5py.Dataset) and item.ndim >= 2:
             grids.add(name.rpartition("/")[0])
 
     with h5py.File(path, "r") as file:

@@ -52,7 +52,7 @@ def _flown(problem: Problem, start: Array, stops: Array, speed: float, sink: flo
     latest, within = LONGEST * integration.dt * integration.steps, 2 * integration.tolerance
     depths = float(problem.lo[2]), float(problem.hi[2])
     step = integration.dt / 5
-    point, places = (np.require(one, np.float64, ["C", "W"]) for one in (start, stops))
+    point, places = (np.require(values, np.float64, ["C", "W"]) for values in (start, stops))
     return float(
         follow(evaluator.flow, point, places, speed, sink, *depths, problem.departure, step, latest, near, within)
     )
@@ -71,7 +71,7 @@ def straight(problem: Problem, start: Array, goal: Array) -> float:
 
 
 def drift(problem: Problem, start: Array, goal: Array) -> float:
-    """Time [s] in which the current alone, at the start's depth, carries a float to the goal; inf if never."""
+    """Time [s] in which only the current, at the start's depth, carries a float to the goal; inf if never."""
     return _flown(problem, start, goal[None, :2], 0.0, 0.0)
 
 

@@ -88,26 +88,26 @@ class Record:
 
     def as_dict(self) -> dict[str, Any]:
         """The record for JSON; the raw integrator's rate, where measured, also under a name of its own."""
-        raw = {one.name: one.median for one in self.figures if one.name == "evaluations_per_s"}
-        return self.made | raw | {"figures": [one.as_dict() for one in self.figures]}
+        raw = {figure.name: figure.median for figure in self.figures if figure.name == "evaluations_per_s"}
+        return self.made | raw | {"figures": [figure.as_dict() for figure in self.figures]}
 
     def __str__(self) -> str:
         made = self.made
         head = f"{made['date']}, {made['processor']}, {made['threads']} threads, Python {made['python']}"
-        return "\n".join([head, *(f"  {one}" for one in self.figures)])
+        return "\n".join([head, *(f"  {figure}" for figure in self.figures)])
 
     def moved(self, before: dict[str, Any]) -> list[str]:
         """What lies outside the spread of a record before, in words: both spreads, and which is better."""
-        then = {one["name"]: one for one in before["figures"]}
-        said = []
+        then = {figure["name"]: figure for figure in before["figures"]}
+        moved = []
         for now in self.figures:
             old = then.get(now.name)
             if old is None or (min(now.values) <= old["high"] and max(now.values) >= old["low"]):
                 continue
             better = "better" if (now.median > old["median"]) == now.more else "worse"
             ratio = now.median / old["median"]
-            said.append(f"{now.name}: {ratio:.2f} times {_said(old['median'])} {now.unit}, {better}")
-        return said
+            moved.append(f"{now.name}: {ratio:.2f} times {_said(old['median'])} {now.unit}, {better}")
+        return moved
 
 
 def bench(
@@ -194,8 +194,8 @@ def integrator(runs: int, ceiling: str | Path | None) -> Iterator[Figure]:
 
 def _ceiling(program: str | Path) -> float:
     try:
-        said = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
-        return float(json.loads(said)["evaluations_per_s"])
+        text = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
+        return float(json.loads(text)["evaluations_per_s"])
     except (OSError, ValueError, KeyError, TypeError, subprocess.CalledProcessError) as error:
         raise InputError(
             f"the ceiling {program} must be a program that prints JSON with `evaluations_per_s`; got {error}"
@@ -215,8 +215,8 @@ def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
     for name in ("streamline 16, all", "flow map, all"):
         ratios = []
         for _ in range(runs):
-            one = _rate(METHODS[name], shape, 1)
-            ratios.append(_rate(METHODS[name], shape) / one)
+            single = _rate(METHODS[name], shape, 1)
+            ratios.append(_rate(METHODS[name], shape) / single)
         yield Figure(f"all threads over one: {name}", "times", tuple(ratios))
 
 
@@ -348,12 +348,12 @@ def read_record(file: str | Path) -> dict[str, Any]:
     try:
         check_file(file, "the record")
         record = json.loads(Path(file).read_text(encoding="utf-8"))
-        for one in record["figures"]:
-            sound = isinstance(one["name"], str) and one["low"] <= one["median"] <= one["high"]
-            require(sound and one["median"] != 0, "its figures make no sense")
+        for figure in record["figures"]:
+            sound = isinstance(figure["name"], str) and figure["low"] <= figure["median"] <= figure["high"]
+            require(sound and figure["median"] != 0, "its figures make no sense")
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        said = (error.strerror or "it is no file").lower() if isinstance(error, OSError) else str(error)
-        raise InputError(f"the record {file} cannot be read: {said}; write it with `bench --json`") from None
+        text = (error.strerror or "it is not a file").lower() if isinstance(error, OSError) else str(error)
+        raise InputError(f"the record {file} cannot be read: {text}; write it with `bench --json`") from None
     return dict(record)
 
 

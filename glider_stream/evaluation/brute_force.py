@@ -105,8 +105,8 @@ def fastest_legs(flow, polar, position, source, target, t, angles, headings, dt,
         x, y, z = position[source[s]]
         for direction in range(2):
             low, high = polar.shallowest[direction], polar.steepest[direction]
-            there = (position[target, 2] - z) * (2.0 * direction - 1.0) > 0.0
-            column = np.flatnonzero(there)
+            ahead = (position[target, 2] - z) * (2.0 * direction - 1.0) > 0.0
+            column = np.flatnonzero(ahead)
             off = scan(flow, polar, direction, position, source[s], target[column], t, angles, headings, dt)
             for k in range(column.size):
                 x_q, y_q, z_q = position[target[column[k]]]

@@ -60,7 +60,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Attempt:
-    """One method's route between one pair of points: its travel time [s], inf where there is none."""
+    """One method's route between one pair of points: its travel time [s], inf if no route exists."""
 
     problem: str
     method: str
@@ -83,7 +83,7 @@ class Outcome:
 
     @property
     def solved(self) -> bool:
-        """Whether there is a route."""
+        """Whether a route exists."""
         return math.isfinite(self.travel_time)
 
 
@@ -106,12 +106,12 @@ class Report:
         """Per problem and method, of random queries: success among those that any method solves, and the
         quartiles and 95 % of the travel time over the best known."""
         best = {(a.problem, a.pair): a.travel_time for a in self.attempts if a.method == BEST}
-        for one in self.attempts:
-            best[one.problem, one.pair] = min(best[one.problem, one.pair], one.travel_time)
+        for attempt in self.attempts:
+            best[attempt.problem, attempt.pair] = min(best[attempt.problem, attempt.pair], attempt.travel_time)
         rows = []
         for problem, method in dict.fromkeys((a.problem, a.method) for a in self.attempts if a.method != BEST):
-            mine = [a for a in self.attempts if (a.problem, a.method) == (problem, method)]
-            able = [a for a in mine if math.isfinite(best[a.problem, a.pair])]
+            attempts = [a for a in self.attempts if (a.problem, a.method) == (problem, method)]
+            able = [a for a in attempts if math.isfinite(best[a.problem, a.pair])]
             ratios = [a.travel_time / best[a.problem, a.pair] for a in able if math.isfinite(a.travel_time)]
             spread = np.percentile(ratios, QUARTILES).round(4).tolist() if ratios else [None] * len(QUARTILES)
             names = [f"p{n}" for n in QUARTILES]
@@ -123,25 +123,31 @@ class Report:
     def as_dict(self) -> dict[str, Any]:
         """The report for JSON; infinite times are null."""
         outcomes = []
-        for one in self.outcomes:
-            row = {**asdict(one), "solved": one.solved, "over_reference": self.over_reference(one)}
-            outcomes.append(row | {"travel_time": one.travel_time if one.solved else None})
+        for outcome in self.outcomes:
+            row = {**asdict(outcome), "solved": outcome.solved, "over_reference": self.over_reference(outcome)}
+            outcomes.append(row | {"travel_time": outcome.travel_time if outcome.solved else None})
         shares = {name: {"share": share, "legs": legs} for name, (share, legs) in self.completeness.items()}
-        references = {name: asdict(one) for name, one in self.references.items()}
+        references = {name: asdict(reference) for name, reference in self.references.items()}
         known = {"references": references, "outcomes": outcomes, "completeness": shares}
         return self.made | known | {"quality": self.quality()}
 
     def __str__(self) -> str:
         head = ("problem", "method", "route", "/ reference", "build", "edges", "pairs/s")
         lines = [ROW.format(*head)]
-        for one in self.outcomes:
-            ratio = self.over_reference(one)
-            route = f"{one.travel_time:,.0f} s" if one.solved else "none"
+        for outcome in self.outcomes:
+            ratio = self.over_reference(outcome)
+            route = f"{outcome.travel_time:,.0f} s" if outcome.solved else "none"
             built = ("", "", "")
-            if one.build_s is not None and one.pairs is not None:
-                built = f"{one.build_s:.2f} s", f"{one.edges:,}", f"{one.pairs / max(one.build_s, 1e-9):,.0f}"
+            if outcome.build_s is not None and outcome.pairs is not None:
+                built = (
+                    f"{outcome.build_s:.2f} s",
+                    f"{outcome.edges:,}",
+                    f"{outcome.pairs / max(outcome.build_s, 1e-9):,.0f}",
+                )
             lines.append(
-                ROW.format(one.problem, one.method, route, "" if ratio is None else f"{ratio:.3f}", *built)
+                ROW.format(
+                    outcome.problem, outcome.method, route, "" if ratio is None else f"{ratio:.3f}", *built
+                )
             )
         lines.append("\nof the legs that brute force finds, the flow map has")
         for name, (share, legs) in self.completeness.items():
@@ -165,14 +171,14 @@ def run_suite(
     *,
     quick: bool = False,
     pairs: int = 20,
-    progress: Callable[[str], None] = lambda said: None,
+    progress: Callable[[str], None] = lambda message: None,
 ) -> Report:
     """Run the problems named in `only`, all if none; `pairs` random queries each; `quick`: few of all."""
     known = references()
     for name in only:
         require(name in known, f"the problem {name!r} is not known; choose from: {', '.join(known)}")
     require(pairs >= 1, f"`pairs` must be at least 1; got {pairs}")
-    chosen = {name: one for name, one in known.items() if name in only or not only}
+    chosen = {name: reference for name, reference in known.items() if name in only or not only}
     outcomes: list[Outcome] = []
     attempts: list[Attempt] = []
     completeness: dict[str, tuple[float, int]] = {}
@@ -253,9 +259,9 @@ def _attempts(
 
 def ompl_log(report: Report, problem: str) -> str:
     """One problem's random queries as an OMPL benchmark log (ompl.kavrakilab.org/benchmark.html): a run each."""
-    mine = [one for one in report.attempts if one.problem == problem]
-    methods = list(dict.fromkeys(one.method for one in mine))
-    runs = len({one.pair for one in mine})
+    chosen = [attempt for attempt in report.attempts if attempt.problem == problem]
+    methods = list(dict.fromkeys(attempt.method for attempt in chosen))
+    runs = len({attempt.pair for attempt in chosen})
     reference = report.references[problem]
     lines = [
         f"glider-stream version {report.made['software_version']}",
@@ -274,12 +280,12 @@ def ompl_log(report: Report, problem: str) -> str:
         "0 seconds per run",
         "0 MB per run",
         f"{runs} runs per planner",
-        f"{sum(one.wall_s for one in mine)} seconds spent to collect the data",
+        f"{sum(attempt.wall_s for attempt in chosen)} seconds spent to collect the data",
         "0 enum types",
         f"{len(methods)} planners",
     ]
     for method in methods:
-        rows = [one for one in mine if one.method == method]
+        rows = [attempt for attempt in chosen if attempt.method == method]
         lines += [
             method.replace(" ", "_"),
             "0 common properties",
@@ -290,9 +296,9 @@ def ompl_log(report: Report, problem: str) -> str:
             "legs INTEGER",
             f"{len(rows)} runs",
         ]
-        for one in rows:
-            solved = math.isfinite(one.travel_time)
-            values = (one.wall_s, int(solved), one.travel_time if solved else math.nan, one.legs)
+        for attempt in rows:
+            solved = math.isfinite(attempt.travel_time)
+            values = (attempt.wall_s, int(solved), attempt.travel_time if solved else math.nan, attempt.legs)
             lines.append("".join(f"{value}; " for value in values))
         lines.append(".")
     return "\n".join(lines) + "\n"

@@ -9,6 +9,7 @@ from .fronts import Fronts, fronts_of
 from .page import PAGE, save_page
 from .roadmap import plot_roadmap
 from .route import plot_route
+from .routes import plot_routes
 from .seabed import sample_bottom
 from .steering import plot_steering
 from .water import sample_field, sample_water
@@ -28,6 +29,7 @@ __all__ = [
     "plot_departures",
     "plot_roadmap",
     "plot_route",
+    "plot_routes",
     "plot_steering",
     "sample_bottom",
     "sample_field",

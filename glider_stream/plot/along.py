@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..roadmap.problem import Problem
 
 SHORTEST = 1e-3
-"""A step [s] below it is the rest that integration leaves: a speed over it would be noise."""
+"""A shorter step [s] is the remainder of an integration: its speed would be noise."""
 
 
 class Along(NamedTuple):
@@ -36,7 +36,7 @@ class Along(NamedTuple):
 
 
 def along(path: Path) -> Along:
-    """The steps of a path: what moved it over ground but for its own speed is the current, R - V cos(gamma)."""
+    """The steps of a path; the current is its motion over ground without its own speed, R - V cos(gamma)."""
     parts = []
     for n, leg in enumerate(path.legs):
         step = np.diff(leg.trajectory, axis=0)

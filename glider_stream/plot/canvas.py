@@ -1,6 +1,6 @@
 """What every figure shares: look, units, files.
 
-Matplotlib's object interface alone: no global state, no window. The layout is frozen and no clock enters a
+Only matplotlib's object interface is used: no global state, no window. The layout is frozen and no clock enters a
 file, so the same input gives the same bytes.
 """
 

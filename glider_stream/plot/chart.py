@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from ..search.path import Path
 
 DEEP = 2.5
-"""A seabed so many times deeper than the route would leave no room for the route."""
+"""A seabed that is so many times deeper than the route is not drawn: the route would be too small."""
 TIME_MAP = "plasma"
 THROUGH, OVER, CURRENT = "#0072b2", INK, "#d55e00"
 
@@ -76,12 +76,12 @@ def plot_chart(
         depth = frame.top if depths is None else float(checked_depths(depths, frame)[0])
         unit, name = time_unit(float(rows[-1, 0]))
         clock = _Clock(unit, name, Normalize(0.0, float(rows[-1, 0]) / unit))
-        said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         if path.departs is not None:
             arrives = path.departs + timedelta(seconds=path.travel_time)
-            said += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
-        said += f"; {STILL}" if path.frozen else ""
-        figure = new_figure(14.0, 8.6, f"{title}: {said}" if title else f"Route: {said}")
+            text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
+        text += f"; {STILL}" if path.frozen else ""
+        figure = new_figure(14.0, 8.6, f"{title}: {text}" if title else f"Route: {text}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
         ax, at = left.add_subplot(), passing(path, problem.departure)
@@ -139,10 +139,10 @@ def _draw_depth(ax: "Axes", terrain: Terrain, rows: Array, clock: _Clock) -> Non
     ax.plot(time, depth, color="white", linewidth=3.6, zorder=4)
     ax.add_collection(_by_time(np.column_stack([time, depth]), rows[:, 0], clock, 2.0))
     ax.set(xlim=(time[0], time[-1]), ylim=(end, -0.05 * end), ylabel="Depth (m)")
-    said = "over the seabed" if shown else "no seabed on the way"
+    text = "over the seabed" if shown else "no seabed on the way"
     if not shown and np.isfinite(near):
-        said = f"the seabed lies at {near:,.0f} m or deeper"
-    ax.set_title(f"(b) Depth, {said}")
+        text = f"the seabed lies at {near:,.0f} m or deeper"
+    ax.set_title(f"(b) Depth, {text}")
 
 
 def _draw_heading(ax: "Axes", steps: Along, clock: _Clock) -> None:

@@ -41,21 +41,21 @@ def plot_comparison(
         figure = new_figure(6.2, 4.2, title)
         axes = figure.add_subplot()
         axes.set(xlabel=labels[0], ylabel=labels[1], xscale=scales[0], yscale=scales[1])
-        for one, (colour, marker, line) in zip(series, LOOKS, strict=False):
-            points = [point for point in one.points if point.x is not None]
-            for level in (point for point in one.points if point.x is None):
-                name = f"{one.name} ({level.note})" if level.note else one.name
+        for method, (colour, marker, line) in zip(series, LOOKS, strict=False):
+            points = [point for point in method.points if point.x is not None]
+            for level in (point for point in method.points if point.x is None):
+                name = f"{method.name} ({level.note})" if level.note else method.name
                 axes.axhline(level.mean, color=colour, linestyle=line, label=name)
                 axes.axhspan(level.low, level.high, color=colour, alpha=0.15, linewidth=0)
             if not points:
                 continue
             below, above = [p.mean - p.low for p in points], [p.high - p.mean for p in points]
             axes.errorbar(
-                [p.x or 0.0 for p in points], [p.mean for p in points], yerr=[below, above], label=one.name,
+                [p.x or 0.0 for p in points], [p.mean for p in points], yerr=[below, above], label=method.name,
                 color=colour, marker=marker, linestyle=line, markersize=4.5, capsize=2.5, linewidth=1.2,
             )  # fmt: skip
             # notes of the first series above, of others below: they rarely meet
-            up = 1 if one is series[0] else -1
+            up = 1 if method is series[0] else -1
             for p in points:
                 axes.annotate(
                     p.note, (p.x or 0.0, p.high if up > 0 else p.low), xytext=(0, 4 * up), color=colour,

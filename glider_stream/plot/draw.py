@@ -1,6 +1,6 @@
 """What is drawn, and where: a roadmap, a route, its chart, or a page of it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as File
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from .fronts import Fronts, fronts_of
 from .page import PAGE, save_page
 from .roadmap import plot_roadmap
 from .route import plot_route
+from .routes import plot_routes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,8 +40,15 @@ def check_drawing(
     needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
     plain = not chart and not as_page and fronts is None
     require(path is not None or plain, f"{needs} needs a path, got none; give the file that `query -o` wrote")
-    one = path is not None or depths is None or len(depths) == 1
-    require(one, f"a roadmap is drawn at one depth; got {depths}")
+    single = path is not None or depths is None or len(depths) == 1
+    require(single, f"a roadmap is drawn at one depth; got {depths}")
+
+
+def check_water(problem: Problem, route: Path, name: str) -> None:
+    """InputError where a leg of a route begins or ends outside the problem's water."""
+    stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
+    here = bool(problem.evaluator.allowed(stops, problem.departure).all())
+    require(here, f"{name} leaves the roadmap's water; draw it over the roadmap that it was found in")
 
 
 def draw_roadmap(
@@ -71,9 +79,7 @@ def draw_route(
     soonest [s], for `fronts` [h].
     """
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
-    stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
-    here = bool(problem.evaluator.allowed(stops, problem.departure).all())
-    require(here, "the path leaves the roadmap's water; draw it over the roadmap that it was found in")
+    check_water(problem, route, "the path")
     if not chart and fronts is None and not is_page(output):
         figure = plot_route(flow, terrain, problem, position, route, depths, title)
     else:
@@ -85,6 +91,23 @@ def draw_route(
             save_page(output, flow, terrain, problem, position, route, depths, every, title)
             return None
         figure = plot_chart(flow, terrain, problem, route, depths, every, title)
+    if output is not None:
+        save_figure(figure, output)
+    return figure
+
+
+def draw_routes(
+    position: Array,
+    problem: Problem,
+    routes: Mapping[str, Path],
+    output: str | File | None,
+    depth: float | None,
+) -> "Figure":
+    """Several routes by name, side by side."""
+    for name, route in routes.items():
+        check_water(problem, route, f"the path {name}")
+    flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
+    figure = plot_routes(flow, terrain, problem, position, routes, depth)
     if output is not None:
         save_figure(figure, output)
     return figure

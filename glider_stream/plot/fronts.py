@@ -56,7 +56,7 @@ def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
 
 
 def front_times(fronts: Fronts, hours: float) -> Array:
-    """The times [s] of fronts every so many hours; InputError where that is no interval, or far too fine."""
+    """The times [s] of fronts every so many hours; InputError where that is not an interval, or far too fine."""
     require(0.0 < hours < math.inf, f"`fronts` must be a number of hours above 0; got {hours:g}")
     last = float(fronts.time.max(initial=0.0)) / HOUR
     lines = last / hours

@@ -46,9 +46,9 @@ def draw_graticule(ax: "Axes", frame: Frame) -> None:
         (meridians, south[:, 0], below, ax.xaxis, "EW"),
         (parallels, west[:, 1], beside, ax.yaxis, "NS"),
     ):
-        there = angles[(angles >= edge[0]) & (angles <= edge[-1])]
-        ticks = np.interp(there, edge, along) / frame.unit
-        axis.set_ticks(ticks, [named(angle, letters) for angle in there])
+        visible = angles[(angles >= edge[0]) & (angles <= edge[-1])]
+        ticks = np.interp(visible, edge, along) / frame.unit
+        axis.set_ticks(ticks, [named(angle, letters) for angle in visible])
     look: dict[str, Any] = {"colors": INK, "linewidths": 0.4, "alpha": 0.25, "linestyles": "solid", "zorder": 3}
     for field, angles in ((lon, meridians), (lat, parallels)):
         within = angles[(angles > field.min()) & (angles < field.max())]

@@ -44,8 +44,8 @@ def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) ->
     if depths is not None:
         require(1 <= len(depths) <= MAX_MAPS, f"`depths` must name 1 to {MAX_MAPS} depths; got {len(depths)}")
         return np.unique(checked_depths(depths, frame))
-    own = np.unique(np.round(-position[:, 2], 1) + 0.0)
-    return own if own.size <= MAX_MAPS else np.round(np.linspace(frame.top, frame.bottom, MAX_MAPS))
+    levels = np.unique(np.round(-position[:, 2], 1) + 0.0)
+    return levels if levels.size <= MAX_MAPS else np.round(np.linspace(frame.top, frame.bottom, MAX_MAPS))
 
 
 def map_columns(count: int, frame: Frame) -> tuple[int, float]:
@@ -82,15 +82,15 @@ def plot_route(
         stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)], np.float64)
         frame = frame_of(problem, np.vstack([rows[:, 1:], stops]))
         norm = Normalize(frame.top, frame.bottom)
-        said = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
         # a date beside each depth would cover the next map's title
         when = said_when(is_steady(flow), problem.departure, problem.departs)
         dated = when if problem.departs is not None else ""
         if path.clock_runs:
             when = dated = PASSING
-        said += f"; currents {'' if path.clock_runs else 'of '}{dated.removeprefix(', ')}" if dated else ""
-        said += f"; {STILL}" if path.frozen else ""
-        figure = new_figure(13.0, 9.8, f"{title}: {said}" if title else f"Route: {said}")
+        text += f"; currents {'' if path.clock_runs else 'of '}{dated.removeprefix(', ')}" if dated else ""
+        text += f"; {STILL}" if path.frozen else ""
+        figure = new_figure(13.0, 9.8, f"{title}: {text}" if title else f"Route: {text}")
         levels, at = map_depths(position, frame, depths), passing(path, problem.departure)
         columns, filled = map_columns(levels.size, frame)
         right = 0.4 + 0.75 * filled

@@ -91,7 +91,7 @@ def draw_current(
 
 
 def draw_ends(ax: Any, points: Array, size: float = 1.0) -> None:
-    """Start and goal, told apart by shape: colour alone is lost in print."""
+    """Start and goal, told apart by shape: print loses colours."""
     for row, marker, area, label in ((0, "o", 70, "start"), (-1, "*", 190, "goal")):
         place = [points[row, k : k + 1] for k in range(points.shape[1])]
         look = {"edgecolors": INK, "facecolors": "white", "linewidths": 1.4, "zorder": 9, "clip_on": False}
@@ -125,5 +125,5 @@ def draw_space(ax: Any, terrain: Terrain, frame: Frame, nodes: Array, ticks: int
 def stretch(frame: Frame) -> str:
     """How many times depth is stretched in `draw_space`, in words."""
     times = HEIGHT * max(frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]) / (frame.bottom - frame.top)
-    said = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
-    return f"depth stretched {said} times" if times > 1.05 else "depth to scale"
+    text = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    return f"depth stretched {text} times" if times > 1.05 else "depth to scale"

@@ -72,9 +72,9 @@ def solutions(evaluator: Evaluator, fan: Fan, goal: Array, departure: float) -> 
 
     found: list[Array] = []
     for i, j in zip(*np.nonzero(lowest), strict=True):
-        one = root(off, [fan.angle[i], fan.heading[j]], options={"xtol": 1e-10})
-        control = np.array([one.x[0], one.x[1] % (2.0 * math.pi)])
-        inside = fan.angle[0] <= control[0] <= fan.angle[-1] and np.hypot(*one.fun) < LANDED
+        solved = root(off, [fan.angle[i], fan.heading[j]], options={"xtol": 1e-10})
+        control = np.array([solved.x[0], solved.x[1] % (2.0 * math.pi)])
+        inside = fan.angle[0] <= control[0] <= fan.angle[-1] and np.hypot(*solved.fun) < LANDED
         if inside and all(np.abs(control - other).max() > 1e-4 for other in found):
             found.append(control)
     return np.array(found).reshape(-1, 2)
@@ -157,8 +157,8 @@ def _draw_mesh(
     )
     reached = np.isin(at_depth, nodes[rows[:, STATUS] == Status.CONNECTED])
     for which, face in ((reached, INK), (~reached, "white")):
-        there = position[at_depth[which], :2] / frame.unit
-        ax.scatter(*there.T, s=14, facecolors=face, edgecolors=INK, linewidths=0.6, zorder=5)
+        marks = position[at_depth[which], :2] / frame.unit
+        ax.scatter(*marks.T, s=14, facecolors=face, edgecolors=INK, linewidths=0.6, zorder=5)
     _draw_point(ax, fan.start / frame.unit, "o")
     _draw_point(ax, goal / frame.unit, "*")
     ax.set_title(
@@ -214,14 +214,14 @@ def _draw_found(ax: Any, evaluator: Evaluator, problem: "Problem", position: Arr
         for name, method in methods.items()
     }
     exact = rows["flow map"]
-    there = exact[:, STATUS] == Status.CONNECTED
-    unit, name_of_unit = time_unit(float(exact[there, 1].max(initial=0.0)))
-    edges = np.linspace(0.0, float(exact[there, 1].max(initial=1.0)) / unit, 26)
+    connected = exact[:, STATUS] == Status.CONNECTED
+    unit, name_of_unit = time_unit(float(exact[connected, 1].max(initial=0.0)))
+    edges = np.linspace(0.0, float(exact[connected, 1].max(initial=1.0)) / unit, 26)
     for (name, found), (face, hatch) in zip(
         rows.items(), (("#d9d9d9", ""), ("#7fa6c9", "///"), ("#1f4e79", "")), strict=True
     ):
-        both = there & (found[:, STATUS] == Status.CONNECTED)
-        share = both.sum() / max(there.sum(), 1)
+        both = connected & (found[:, STATUS] == Status.CONNECTED)
+        share = both.sum() / max(connected.sum(), 1)
         label = f"{name}: {both.sum():,} ({share:.0%})"
         ax.hist(
             exact[both, 1] / unit, edges, label=label, facecolor=face, hatch=hatch, edgecolor=GREY, linewidth=0.5

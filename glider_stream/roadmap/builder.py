@@ -116,7 +116,13 @@ def build_roadmap(
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
 ) -> Roadmap:
-    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk."""
+    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk.
+
+    Examples:
+        >>> problem = glider_stream.read_scenario("small.toml").problem()
+        >>> glider_stream.build_roadmap(problem).target.size
+        929
+    """
     position = node_positions(problem)
     parts: list[Edges] = []
     with threads(thread_count) as used:

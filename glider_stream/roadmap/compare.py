@@ -26,7 +26,7 @@ MOST_LINES = 40
 
 @dataclass(frozen=True)
 class Difference:
-    """`made`: what differs of what made them, by name, both values; `scenario`: lines of either alone.
+    """`made`: what made them differently, by name, with both values; `scenario`: the lines that only one has.
 
     `edges`: how many only the first has, only the second, and both; `times` [s]: the greatest difference in
     the time of an edge that both have, and how many differ. None where the nodes are not the same.
@@ -62,9 +62,10 @@ class Difference:
             f"{name}: {first or 'not said'} | {second or 'not said'}"
             for name, (first, second) in self.made.items()
         ]
-        for mark, own in zip("<>", self.scenario, strict=True):
-            lines += [f"{mark} {plain(line)}" for line in own[:MOST_LINES]]
-            lines += [f"{mark} ... {len(own) - MOST_LINES} lines more"] if len(own) > MOST_LINES else []
+        for mark, lines_of_one in zip("<>", self.scenario, strict=True):
+            lines += [f"{mark} {plain(line)}" for line in lines_of_one[:MOST_LINES]]
+            more = len(lines_of_one) - MOST_LINES
+            lines += [f"{mark} ... {more} lines more"] if more > 0 else []
         if self.edges is None or self.times is None:
             lines.append("their nodes are not the same, so no edge is compared")
         elif self.same_edges:
@@ -85,19 +86,19 @@ def difference(first: Roadmap, second: Roadmap) -> Difference:
         if values[0] != values[1]:
             made[word] = (values[0][:40], values[1][:40])
     texts = [road.provenance.scenario.splitlines() for road in (first, second)]
-    alone = tuple(
-        tuple(line for line in own if line and line not in set(other)) for own, other in (texts, texts[::-1])
+    unshared = tuple(
+        tuple(line for line in text if line and line not in set(other)) for text, other in (texts, texts[::-1])
     )
     if first.position.tobytes() != second.position.tobytes():
-        return Difference(made, (alone[0], alone[1]), None, None)
+        return Difference(made, (unshared[0], unshared[1]), None, None)
     keys = _keys(first), _keys(second)
-    both, mine, other = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
+    both, in_first, in_second = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
     unlike = np.zeros(both.size, dtype=bool)
     for name in EDGE_FIELDS:
-        unlike |= getattr(first, name)[mine] != getattr(second, name)[other]
-    apart = float(np.abs(first.time[mine] - second.time[other]).max(initial=0.0))
+        unlike |= getattr(first, name)[in_first] != getattr(second, name)[in_second]
+    apart = float(np.abs(first.time[in_first] - second.time[in_second]).max(initial=0.0))
     counts = keys[0].size - both.size, keys[1].size - both.size, both.size
-    return Difference(made, (alone[0], alone[1]), counts, (apart, int(unlike.sum())))
+    return Difference(made, (unshared[0], unshared[1]), counts, (apart, int(unlike.sum())))
 
 
 def _keys(road: Roadmap) -> NDArray[np.int64]:

@@ -41,7 +41,7 @@ class Nearest:
         )
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """As NeighbourLaw says."""
+        """The neighbours among nodes (n, 3) [m] that fill a `volume` [m^3]."""
         k = math.ceil(math.e * (4 / 3) * math.log(max(len(position), 2))) if self.k == "prm*" else int(self.k)
         return _Nearest(KDTree(position), k)
 
@@ -78,7 +78,7 @@ class Radius:
         require(fits, f'`neighbours.radius` must be above 0, or "prm*"; got {self.radius}')
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """As NeighbourLaw says."""
+        """The neighbours among nodes (n, 3) [m] that fill a `volume` [m^3]."""
         n = max(len(position), 2)
         unit_ball = 4 / 3 * math.pi
         prm_star = 2 * (4 / 3 * volume / unit_ball * math.log(n) / n) ** (1 / 3)
@@ -100,7 +100,7 @@ class AllNodes:
     """Every node at another depth."""
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """As NeighbourLaw says."""
+        """The neighbours among nodes (n, 3) [m] that fill a `volume` [m^3]."""
         return _All(position)
 
 

@@ -12,17 +12,17 @@ from ..base.arrays import Array
 from ..base.settings import require
 
 Allowed = Callable[[Array], NDArray[np.bool_]]
-"""Which of the points (n, 3) [m] a node may lie at."""
+"""Says which of the points (n, 3) [m] may be nodes."""
 
 
 MOST_NODES = 10_000_000
-"""More fit in no memory that a roadmap has."""
+"""A roadmap with more nodes does not fit into memory."""
 MOST_DRAWN = 4 * MOST_NODES
 """Points that are drawn in search of open water, at most: they are held at once."""
 
 
 class Sampler(Protocol):
-    """A law of nodes: `nodes` places them, `seed` is 0 where there is none."""
+    """A way to place nodes; `seed` is 0 where no random numbers are used."""
 
     @property
     def seed(self) -> int:
@@ -48,7 +48,7 @@ class GridSampler:
         require(fits, f"`sampling.shape` = {list(self.shape)} is {size:,} nodes; take at most {MOST_NODES:,}")
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """As Sampler says; x outermost, z innermost, from the surface down."""
+        """Points (n, 3) [m] in the box lo..hi: x varies slowest, z fastest, from the surface down."""
         nx, ny, nz = self.shape
         x = lo[0] + (np.arange(nx) + 0.5) / nx * (hi[0] - lo[0])
         y = lo[1] + (np.arange(ny) + 0.5) / ny * (hi[1] - lo[1])
@@ -74,7 +74,7 @@ class RandomSampler:
         return np.random.default_rng(self.seed).random((count, 3))
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """As Sampler says."""
+        """Points (count, 3) [m] in the box lo..hi, in the order of the sequence."""
         drawn = self.count
         while True:
             points = lo + self.draw(drawn) * (hi - lo)
@@ -94,7 +94,7 @@ class SobolSampler(RandomSampler):
     """A scrambled Sobol sequence."""
 
     def draw(self, count: int) -> Array:
-        """As RandomSampler says."""
+        """The first `count` points (count, 3) of the sequence in the unit cube."""
         from scipy.stats import qmc  # half of a query's start-up, and few scenarios draw from it
 
         powers = (count - 1).bit_length()
@@ -106,7 +106,7 @@ class HaltonSampler(RandomSampler):
     """A scrambled Halton sequence."""
 
     def draw(self, count: int) -> Array:
-        """As RandomSampler says."""
+        """The first `count` points (count, 3) of the sequence in the unit cube."""
         from scipy.stats import qmc
 
         return np.asarray(qmc.Halton(3, rng=np.random.default_rng(self.seed)).random(count))
@@ -139,7 +139,7 @@ class YoSampler:
         return YoSampler(self.depths, spacing=leg / self.per_leg)
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """As Sampler says; x outermost, z innermost, from the shallowest down."""
+        """Points (n, 3) [m] in the box lo..hi: x varies slowest, z fastest, from the shallowest down."""
         assert self.spacing is not None
         deepest, most = max(self.depths), -float(lo[2])
         require(deepest <= most, f"`sampling.depths` reach {deepest:g} m, the domain {most:g} m; deepen it")

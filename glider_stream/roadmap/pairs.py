@@ -80,7 +80,7 @@ class NeighbourLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """As Legs says: the most of some nodes, far apart in the order."""
+        """The most pairs that one of some nodes makes; these nodes lie far apart in the order."""
         some = np.linspace(0, len(self.position) - 1, SAMPLED).astype(np.int64)
         return max(1, *(len(self.neighbourhood.of(self.position[n])) for n in some))
 
@@ -104,11 +104,11 @@ class NeighbourLegs:
         return self.neighbourhood.of(point)
 
     def towards(self, point: Array) -> Attached:
-        """As Legs says; by one fan backward in time where the method and the flow allow it."""
+        """Pairs from nodes to a point (3,) [m]; by one fan backward in time where method and flow allow it."""
         nodes = self.neighbourhood.of(point)
         if self.evaluator.flies_backward:
-            there, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
-            return Attached(nodes[there], outcomes)
+            found, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
+            return Attached(nodes[found], outcomes)
         return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
 
 
@@ -127,7 +127,7 @@ class ReachableLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """As Legs says."""
+        """Twice the limit; all nodes where no limit is set."""
         return 2 * self.limit if self.limit else len(self.position)
 
     def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
@@ -153,7 +153,7 @@ class ReachableLegs:
         return np.flatnonzero(self.position[:, 2] != point[2])
 
     def towards(self, point: Array) -> Attached:
-        """As Legs says; all that reach it."""
+        """Pairs to a point (3,) [m] from all nodes that reach it."""
         if not is_steady(self.evaluator.flow):
             return _each_towards(self.evaluator, self.position, self.before(point), point, self.departure)
         nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, True)

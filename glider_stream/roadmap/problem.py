@@ -25,6 +25,11 @@ class Problem:
     where known. `frozen`: queries take every leg as at the departure, though the flow changes; `bins` [s]:
     queries keep ways to one node apart that arrive in different bins of time. `flow_words`, `glider_words` say
     what they are. `domain` is that of the scenario.
+
+    Examples:
+        >>> problem = glider_stream.read_scenario("small.toml").problem()
+        >>> problem.lo.tolist(), problem.departure
+        ([-200.0, -200.0, -150.0], 0.0)
     """
 
     evaluator: Evaluator
@@ -50,17 +55,17 @@ class Problem:
         if self.to_lonlat is not None and np.isfinite(point).all():
             shown = [*self.to_lonlat(point[None])[0], 0.0 - point[2]]
             deepest = f"domain, which ends at a depth of {-self.lo[2]:g} m"
-        said = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
-        require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {said}")
-        require(point[2] <= 0, f"`{name}` = {said} lies above the surface; z is upward, a depth of 100 m is -100")
-        require(bool(point[2] >= self.lo[2]), f"`{name}` = {said} lies below the {deepest}; move it up")
+        text = "[" + ", ".join(f"{value:.7g}" for value in shown) + "]"
+        require(bool(np.isfinite(point).all()), f"`{name}` must be three finite numbers; got {text}")
+        require(point[2] <= 0, f"`{name}` = {text} lies above the surface; z is upward, a depth of 100 m is -100")
+        require(bool(point[2] >= self.lo[2]), f"`{name}` = {text} lies below the {deepest}; move it up")
         if bool(self.evaluator.allowed(point[None], self.departure)[0]):
             return
         outside = "" if self.domain is None else self.domain.outside(shown[0], shown[1])
-        require(not outside, f"`{name}` = {said} lies {outside}")
-        there = contains(self.evaluator.flow, float(point[0]), float(point[1]), self.departure)
-        where = "on land, in a keep-out area or too near the seabed" if there else "outside the flow"
-        require(False, f"`{name}` = {said} lies {where}; move it into open water")
+        require(not outside, f"`{name}` = {text} lies {outside}")
+        inside = contains(self.evaluator.flow, float(point[0]), float(point[1]), self.departure)
+        where = "on land, in a keep-out area or too near the seabed" if inside else "outside the flow"
+        require(False, f"`{name}` = {text} lies {where}; move it into open water")
 
     def legs(self, position: Array) -> Legs:
         """How legs among these nodes (n, 3) [m] are found."""

@@ -150,6 +150,14 @@ class Roadmap:
     (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
     `node_counts` (n, statuses) those of each node, where the file has them. `file`: where it was read from;
     `elsewhere`: section.key=FILE for each file of its scenario that the user says is now there.
+
+    Examples:
+        >>> roadmap = glider_stream.read_roadmap("small.h5")
+        >>> roadmap.position.shape, roadmap.target.size
+        ((77, 3), 929)
+        >>> first = slice(roadmap.indptr[0], roadmap.indptr[1])
+        >>> len(roadmap.target[first]) == len(roadmap.time[first])
+        True
     """
 
     position: Array

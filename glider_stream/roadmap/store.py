@@ -193,7 +193,12 @@ def _check_written(temporary: Path, path: Path, digests: dict[str, Any]) -> None
 
 
 def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
-    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all."""
+    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all.
+
+    Examples:
+        >>> roadmap = glider_stream.read_roadmap("small.h5")
+        >>> glider_stream.write_roadmap(roadmap, "copy.h5")
+    """
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
     nodes = len(roadmap.position)
     counts = np.zeros((nodes, len(Status)), np.int32) if roadmap.node_counts is None else roadmap.node_counts
@@ -206,7 +211,12 @@ def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
-    """Read a roadmap file; InputError where it is not one, newer, incomplete or damaged."""
+    """Read a roadmap file; InputError where it is not one, newer, incomplete or damaged.
+
+    Examples:
+        >>> glider_stream.read_roadmap("small.h5").target.size
+        929
+    """
     path = Path(path)
     with _reading(path) as file:
         _check_head(file, path, FORMAT)

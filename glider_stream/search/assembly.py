@@ -65,6 +65,7 @@ class Assembly:
             begins = self.begins(clock)
             rows = self.problem.evaluator.trace(source, edge, begins)
             rows[:, 0] += clock - begins
+            rows[[0, -1], 0] = clock, clock + edge.time  # the sum above rounds; legs follow each other exactly
             control = edge.glide_angle, edge.heading, edge.speed
             ends, track = self._lonlat(source, target), self._lonlat(*rows[:, 1:])
             north = self._north(source)

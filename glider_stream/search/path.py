@@ -36,6 +36,13 @@ class Leg:
     `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
     Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
     trajectory, and `north` [rad], true north counter-clockwise from the frame's +y. `cost`: its own.
+
+    Examples:
+        >>> leg = road.query().legs[0]
+        >>> bool(leg.end[2] < leg.start[2]), leg.glide_angle < 0
+        (True, True)
+        >>> round(leg.compass, 1)
+        137.5
     """
 
     start: Array
@@ -94,6 +101,13 @@ class Path:
     begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
     `expanded`: the share of the nodes from which the search looked for legs, where it did.
     `unthinned`: how many legs and seconds it had before it was thinned.
+
+    Examples:
+        >>> path = road.query()
+        >>> path.found, len(path.legs), path.unit
+        (True, 4, 's')
+        >>> path.trajectory.shape[1]
+        4
     """
 
     start: Array

@@ -69,7 +69,13 @@ class _Search:
 
 
 class Planner(RoutePlanner):
-    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is."""
+    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is.
+
+    Examples:
+        >>> planner = glider_stream.Planner(road.roadmap, road.problem)
+        >>> planner.query(np.array([-190.0, 190.0, 0.0]), np.array([100.0, -100.0, -75.0])).found
+        True
+    """
 
     def __init__(
         self,

@@ -19,7 +19,14 @@ LEAST_HOURS = 0.001
 
 @dataclass(frozen=True)
 class Surfacing:
-    """At most so many yos (a dive and a climb), and so many hours, from one surfacing to the next."""
+    """At most so many yos (a dive and a climb), and so many hours, from one surfacing to the next.
+
+    Examples:
+        >>> rule = glider_stream.Surfacing(most_yos=1)
+        >>> path = road.query(surfacing=rule)
+        >>> rule.holds(path)
+        True
+    """
 
     most_yos: int | None = None
     most_hours: float | None = None

@@ -137,6 +137,10 @@ class ClockPlanner(RoutePlanner):
 
     def _ends(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> Ends:
         """Where the ends of a query are, checked."""
+        departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
+        times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
+        within = extent.t_lo <= departure <= extent.t_hi
+        require(within, f"the departure at {departure:g} s lies outside {times}; choose one of them")
         begin = placed_end(self.problem, start, self.problem.start, "start")
         places = [placed_end(self.problem, goal, self.problem.goal, "goal") for goal in goals]
         for place, name in [(begin, "start"), *((place, "goal") for place in places)]:
@@ -148,10 +152,7 @@ class ClockPlanner(RoutePlanner):
         return aim if bins is None else replace(aim, bins=bins, latest=self.problem.departure + MOST_BINS * bins)
 
     def _search(self, ends: Ends, aim: Aim, to_all: bool = False) -> tuple[LabelSearch, ClockExpansion]:
-        departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
-        times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
-        within = extent.t_lo <= departure <= extent.t_hi
-        require(within, f"the departure at {departure:g} s lies outside {times}; choose one of them")
+        departure = self.problem.departure
         expansion = ClockExpansion(self.problem, self.position, ends, self.assembly.frozen)
         goals = np.empty(0, np.int64) if to_all else expansion.goals[0]
         least = LeastTimes(self._speeds_now(), expansion.places)

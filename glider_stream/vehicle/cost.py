@@ -11,6 +11,7 @@ from ..base.settings import require
 from ..kernels import cost
 
 GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class TravelTime:
     unit: ClassVar[str] = "s"
 
     def kernel(self) -> cost.Cost:
-        """As the kernels read it; a cost rises with time, so the fastest control is the cheapest."""
+        """The cost of a second and of a leg, for the kernels: the fastest control is the cheapest."""
         return cost.Cost(1.0, 0.0)
 
     def inflection(self, z: ArrayLike) -> Array | None:
@@ -49,7 +50,8 @@ class Energy:
         for name in ("hotel", "trim", "volume", "density"):
             value = getattr(self, name)
             require(value >= 0, f"`cost.{name}` must be at least 0; got {value:g}")
-        require(self.hotel > 0, "`cost.hotel` must be above 0 W: else time is free, and the slowest way as good")
+        free = f"`cost.hotel` must be above 0 W, so that time costs something; got {self.hotel:g}"
+        require(self.hotel > 0, free)
         require(len(self.efficiency) > 0, "`cost.efficiency` must be pairs of depth and share; got none")
         depth, share = zip(*self.efficiency, strict=True)
         require(bool((np.diff(depth) > 0).all()), f"the depths of `cost.efficiency` must rise; got {list(depth)}")
@@ -57,11 +59,11 @@ class Energy:
         require(within, f"the shares of `cost.efficiency` must be above 0, at most 1; got {list(share)}")
 
     def kernel(self) -> cost.Cost:
-        """As TravelTime says."""
+        """The rate [W] and the fixed cost [J] of a leg, for the kernels; a cost rises with time."""
         return cost.Cost(float(self.hotel), float(self.trim))
 
     def inflection(self, z: ArrayLike) -> Array | None:
-        """As TravelTime says."""
+        """What the pump uses [J] where a dive turns into a climb at heights z [m]: rho g |z| dV / eta(z)."""
         depth = np.abs(np.asarray(z, np.float64))
         known, shares = (np.array(column) for column in zip(*self.efficiency, strict=True))
         share = np.interp(depth, known, shares)
@@ -83,11 +85,11 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 def energy_from_table(table: dict[str, Any]) -> dict[str, Any]:
-    """The keys of an [cost] table of kind "energy", those of its `preset` filled in."""
-    own = dict(table)
-    name = own.pop("preset", None)
+    """The keys of a [cost] table of kind "energy"; the values of its `preset` replace missing keys."""
+    given = dict(table)
+    name = given.pop("preset", None)
     if name is None:
-        return own
+        return given
     known = isinstance(name, str) and name in PRESETS
     require(known, f"`cost.preset` = {name!r} is not known; choose from: {', '.join(PRESETS)}")
-    return PRESETS[name] | own
+    return PRESETS[name] | given

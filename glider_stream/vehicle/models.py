@@ -55,11 +55,11 @@ class Glider:
             require(value > 0.0, f"`glider.{name}` must be greater than 0; got {value}")
 
     def speed(self, gamma: Array | float) -> Array:
-        """Speed through water V [m/s] at the signed glide angle [rad]; NaN where there is no steady glide."""
+        """Speed through water V [m/s] at the signed glide angle [rad]; NaN where no steady glide exists."""
         return self._glide(self._feasible(gamma))[0]
 
     def angle_of_attack(self, gamma: Array | float) -> Array:
-        """Angle of attack alpha [rad] at the signed glide angle [rad]; NaN where there is no steady glide."""
+        """Angle of attack alpha [rad] at the signed glide angle [rad]; NaN where no steady glide exists."""
         return self._glide(self._feasible(gamma))[1]
 
     def net_mass(self, gamma: Array | float) -> Array:
@@ -72,7 +72,7 @@ class Glider:
         return self.feasible_limits()
 
     def feasible_limits(self) -> tuple[float, float]:
-        """The limits [rad]: gamma below the first dives, above the second climbs; between is no glide."""
+        """Limits [rad]: gamma below the first dives, above the second climbs; no glide exists between them."""
         raise NotImplementedError
 
     def _net_masses(self) -> tuple[float, float]:

@@ -11,11 +11,14 @@ from ..base.errors import InputError
 from ..base.settings import require
 from ..kernels.control import Polar
 
-POLAR_TOLERANCE = 1e-7  # relative error of the table, linear between its angles
+POLAR_TOLERANCE = 1e-7
+"""The relative error of a speed that is read from the table, which is linear between its angles."""
 
-POLAR_STEPS = (256, 65536)  # fewest and most steps of the table
+POLAR_STEPS = (256, 65536)
+"""The fewest and the most steps that a table may have."""
 
-ROUNDING = 8 * np.finfo(np.float64).eps  # more than the kernels' interpolation errs by
+ROUNDING = 8 * np.finfo(np.float64).eps
+"""A relative error that is larger than the rounding error of the kernels' interpolation."""
 
 
 class SteadyModel(Protocol):
@@ -51,7 +54,7 @@ def polar(model: SteadyModel) -> Polar:
             limits = np.degrees(np.abs(model.feasible_limits()))
             raise InputError(
                 f"`glider.angles` = {list(model.angles)} begins too near the limit of a steady glide, "
-                f"{limits.max():.4f} degrees, for a table of {most} steps: begin steeper"
+                f"{limits.max():.4f} degrees, for a table of {most} steps: choose a steeper first angle"
             )
     angle, speed = angle[::2], np.ascontiguousarray(speed[:, ::2])
     fastest = np.array([_fastest(angle, row) for row in speed])

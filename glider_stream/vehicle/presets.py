@@ -8,12 +8,12 @@ from ..base.errors import InputError
 from ..base.settings import from_kinds, from_table, require
 from .models import MODELS, Glider, Seaglider, SteadyGlide
 
-# the papers' symbols, accepted for the keys
 SYMBOLS = {
     **{"K_D0": "drag_0", "K_D": "drag_alpha2", "K_L0": "lift_0", "K_L": "lift_alpha"},
     **{"off": "offset", "m_b_max": "ballast_max", "g": "gravity"},
     **{"a": "lift", "b": "drag", "c": "induced_drag", "s": "drag_exponent", "rho0": "density", "l": "length"},
 }
+"""The papers' symbols, which may stand for the keys."""
 
 PRESETS: dict[str, Glider] = {
     "paper": SteadyGlide(

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from glider_stream import plot
-from glider_stream.kernels.flow import OceanGrid, Vortices
+from glider_stream.kernels.flow import Extent, OceanGrid, Vortices
 from glider_stream.kernels.terrain import OpenWater, Seabed
 from glider_stream.search.path import Leg, Path
 
@@ -19,7 +19,7 @@ def vortices():
     speed = random.uniform(0.6, 1.5, n) * random.choice([-1, 1], n)
     depth, thickness = random.uniform(0, 300, n), random.uniform(150, 320, n)
     box = (-600.0, 600.0, -600.0, 600.0, -np.inf, np.inf)
-    return Vortices(x, y, radius, speed, depth, thickness, *box, 1.9, 100.0)
+    return Vortices(x, y, radius, speed, depth, thickness, Extent(*box, 1.9, 100.0))
 
 
 def zigzag(start, goal, depths, duration, bend, rows=40):
@@ -65,7 +65,8 @@ def ocean_scene():
     per, slot, days = (n - 1) / (hi - lo), np.zeros(1, np.uintp), 172800.0
     levels, times = np.array([-500.0, 0.0]), np.array([0.0, days])
     box = (lo, hi, lo, hi, 0.0, days)
-    flow = OceanGrid(values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, *box, 0.4, 2e3)
+    extent = Extent(*box, 0.4, 2e3)
+    flow = OceanGrid(values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, extent)
     terrain = Seabed(bottom, 20.0, index_map, per, per, lo, lo, bottom)
     position = np.random.default_rng(1).uniform([lo, lo, -500], [hi, hi, 0], (1500, 3))
     position = position[plot.sample_water(terrain, *position.T)]

@@ -70,7 +70,7 @@ def test_the_path_and_the_card(departs):
 def test_the_score(departs):
     edge = Edge(int(Status.CONNECTED), 7200.0, 7200.0, -0.4, 0.0, 0.4, 0.0)
     path = replace(route(), departs=departs)
-    found = score([np.zeros(3), np.array([1.0, 2.0, -3.0])], lambda a, b: edge, None, lambda hops: path)
+    found = score([np.zeros(3), np.array([1.0, 2.0, -3.0])], lambda a, b, since: edge, None, lambda hops: path)
     found = replace(found, legs=(replace(found.legs[0], glides=3),), notes=("as drawn",))
     said = str(found).splitlines()
     assert said[0] == "the route takes 7,200 s (2.00 h)" + (

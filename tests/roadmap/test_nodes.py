@@ -117,7 +117,7 @@ def test_grid_of_one_level_lies_at_the_top():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: RandomSampler(0, 0), "`sampling.count` must be at least 1; got 0"),
+        (lambda: RandomSampler(0, 0), "`sampling.count` must be from 1 to 10,000,000; got 0"),
         (lambda: HaltonSampler(5, -1), "`sampling.seed` must be at least 0; got -1"),
         (lambda: GridSampler((3, 0, 1)), r"`sampling.shape` must be at least 1 each way; got \[3, 0, 1\]"),
     ],

@@ -192,7 +192,7 @@ def test_with_a_clock_legs_leave_when_their_node_is_reached(problem, monkeypatch
 
 
 def test_a_rule_of_surfacings_is_explained_on_the_nodes_themselves(problem):
-    search = SurfacingPlanner(roadmap(), problem, Surfacing(most_hours=1e-4))
+    search = SurfacingPlanner(roadmap(), problem, Surfacing(most_hours=1e-3))
     path = search.query(START, GOAL)
     assert not path.found
     assert path.why_not["nodes"] == len(roadmap().position)

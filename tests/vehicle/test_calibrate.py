@@ -232,18 +232,19 @@ def test_dives_too_flat_for_the_vehicle_and_far_off_are_named(tmp_path):
         ("a,b\n1,2\n", "no column of vertical speeds, name it by `vertical`; it has: a, b"),
         ("w,a\n0.1,2\n", "must have a horizontal speed, a pitch or a glide angle, name one; it has: w, a"),
         ("w,u\n0.1,0.2\n", "3 dives or more; got 1"),
-        ("w,u\n0.1,x\n", "line 2 of dives.csv: u = 'x' is no number"),
+        ("w,u\n0.1,x\n", "line 2 of dives.csv: u = 'x' is not a number"),
         ("w,u\n\n0.1,nan\n", "line 3 of dives.csv: u = 'nan' must lie between 0 and 10"),
-        ("w;u\n0,1;0.2\n", "line 2 of dives.csv: w = '0,1' is no number"),
+        ("w;u\n0,1;0.2\n", "line 2 of dives.csv: w = '0,1' is not a number"),
         ("w,u\n0.1,0.2\n0.0,0.2\n", "line 3 of dives.csv: w = '0.0' is 0, which no dive has"),
         ("w,u\n0.1,-0.2\n", "u = '-0.2' must lie between 0 and 10"),
         ("w,u\n0.1\n", "line 2 of dives.csv has 1 cells, and the header 2"),
         ("w,u,u\n0.1,0.2,0.2\n", "more than one column `u`"),
         ("w,u,vertical_speed\n0.1,0.2,0.1\n", "more than one column for `vertical`: w, vertical_speed"),
+        ("vertical,horizontal,w\n0.1,0.2,0.1\n", "more than one column for `vertical`: vertical, w"),
         ("w,pitch\n0.1,95\n", "pitch = '95' must lie between -90 and 90"),
         ("w,pitch\n-0.1,20\n-0.1,-20\n", "line 2 of dives.csv: w = -0.1 is below 0 in a climb as in a dive"),
         ("w,u,phase\n-0.1,0.2,dive\n0.1,0.2,dive\n", "line 3 of dives.csv: w = 0.1 has another sign"),
-        ("w,u,phase\n0.1,0.2,loiter\n", "phase = 'loiter' is no phase; choose from: dive, down, climb, up"),
+        ("w,u,phase\n0.1,0.2,loiter\n", "phase = 'loiter' is not a phase; choose from: dive, down, climb, up"),
         ("w,u,buoyancy_cc,net_mass\n0.1,0.2,150,0.15\n", "a buoyancy in cc and one in kg; leave one out"),
         ("w,u\n" + "0.1,0.2\n" * (MOST_DIVES + 1), "at most 5,000 dives"),
         ("w,u\n" + "9,9\n" * 3, "no buoyancy within a factor of 33 of the preset's fits w, u"),
@@ -269,7 +270,7 @@ def test_columns_by_another_name(tmp_path, capsys):
     refused = command(capsys, "calibrate", path, "--column", "vertical=none")
     assert refused.code == 2
     assert "no column `none`; it has: sink, horizontal_speed" in refused.err
-    assert "`depth` is nothing that is read" in command(capsys, "calibrate", path, "--column", "depth=sink").err
+    assert "`depth` is not known; choose from" in command(capsys, "calibrate", path, "--column", "depth=sink").err
     path.write_bytes(b"w,u\n\xff,1\n")
     assert "cannot be read as CSV" in command(capsys, "calibrate", path).err
     assert "does not exist" in command(capsys, "calibrate", tmp_path / "none.csv").err

@@ -73,7 +73,7 @@ def test_no_time_is_bridged_that_the_file_lacks(tmp_path):
     assert at_hours(file, 50.0) is None
     frame = LocalFrame.over(*DOMAIN)
     flow, _ = ocean_flow(file, frame, *DOMAIN, (0.0, 50.0), "2024-11-20T02:00")
-    assert flow.t_hi == 9 * 3600.0
+    assert flow.extent.t_hi == 9 * 3600.0
     with pytest.raises(InputError, match=r"lies in a gap of currents.nc: no data from 2024-11-20T11:00:00Z"):
         ocean_flow(file, frame, *DOMAIN, (0.0, 50.0), "2024-11-22T00:00")
 

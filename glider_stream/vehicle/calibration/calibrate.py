@@ -29,7 +29,7 @@ KEYS: dict[type[Glider], tuple[str, str, str]] = {
 """By model: the keys of parasite drag, induced drag and lift."""
 INSTRUMENTS = ("vertical", "horizontal", "glide_angle", "pitch")
 DETERMINED = 0.25
-"""A relative standard error beyond it is no determination: the coefficient is held instead."""
+"""A coefficient whose relative standard error is larger is not determined, and keeps the preset's value."""
 OUTLYING = 3.0
 """Scatters away from the fit that make a dive worth a look."""
 FLAT = 0.1
@@ -88,7 +88,7 @@ def _vague(problem: FitProblem, fit: Fit, first: Fit) -> tuple[str, str] | None:
         return None
     worst = max(loose, key=lambda n: (bool(fit.bound[n]), float(fit.errors[n])))
     name, error = fit.names[worst], float(fit.errors[worst])
-    flat = [np.mean(problem.flat(one)) for one in (fit, first)]
+    flat = [np.mean(problem.flat(found)) for found in (fit, first)]
     if fit.bound[worst]:
         return name, "these dives fit best with one that no vehicle has, so they do not determine it"
     if flat[0] > flat[1] + FLAT:
@@ -107,14 +107,14 @@ def _held(drag: str, base: Glider) -> dict[str, str]:
 
 def _problem(dives: Dives, base: Glider) -> FitProblem:
     unit = per_volume(base)
-    own = base.dive_volume if isinstance(base, Seaglider) else float(base.net_mass(-1.0)) / unit
+    volume = base.dive_volume if isinstance(base, Seaglider) else float(base.net_mass(-1.0)) / unit
     kinds = tuple(kind for kind in INSTRUMENTS if getattr(dives, kind) is not None)
     if dives.buoyancy is not None:
-        return FitProblem(dives, base, own, kinds, {}, dives.buoyancy / (unit if dives.unit == "kg" else 1.0))
+        return FitProblem(dives, base, volume, kinds, {}, dives.buoyancy / (unit if dives.unit == "kg" else 1.0))
     groups = {"buoyancy": np.full(dives.vertical.size, True)}
     if dives.down is not None and min(dives.down.sum(), (~dives.down).sum()) > 1:
         groups = {"dive_buoyancy": dives.down, "climb_buoyancy": ~dives.down}
-    return FitProblem(dives, base, own, kinds, groups, None)
+    return FitProblem(dives, base, volume, kinds, groups, None)
 
 
 def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str]) -> Calibration:
@@ -140,8 +140,8 @@ def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str
     wide = float(stdtrit(max(count - fitted, 1), 0.5 + CONFIDENCE / 2)) * math.sqrt(1 + fitted / count)
     off = np.abs(vertical if horizontal is None else np.hypot(vertical, horizontal))
     outlying = dives.line[off > OUTLYING * scatter(off, fitted)]
-    said = [f"{name} {one.value:.5g} +- {one.error:.2g} {one.unit}".rstrip() for name, one in parameters.items()]
-    note = f"fitted to {count} dives: {', '.join(said)}; held: {', '.join(held)}"
+    values = [f"{name} {p.value:.5g} +- {p.error:.2g} {p.unit}".rstrip() for name, p in parameters.items()]
+    note = f"fitted to {count} dives: {', '.join(values)}; held: {', '.join(held)}"
     volumes = _volumes(dives, flown.volumes)
     glider = vehicle(base, problem.values(ratio), *volumes, name=f"{preset}, calibrated", note=note)
     return Calibration(
@@ -161,7 +161,7 @@ def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str
 def _volumes(dives: Dives, volumes: Array) -> tuple[float, float]:
     """The mean off neutral in a dive and in a climb [cc]; the other's where one of them is not flown."""
     phases = [volumes] * 2 if dives.down is None else [volumes[dives.down], volumes[~dives.down]]
-    dive, climb = (float((one if one.size else volumes).mean()) for one in phases)
+    dive, climb = (float((phase if phase.size else volumes).mean()) for phase in phases)
     return dive, climb
 
 

@@ -14,8 +14,24 @@ from ...base.errors import InputError
 from ...base.settings import require
 
 COLUMNS = {
-    "vertical": ("vertical_speed", "vertical_speed_mps", "mean_abs_vert_speed_mps", "vert_speed", "w", "w_mps"),
-    "horizontal": ("horizontal_speed", "horizontal_speed_mps", "mean_horz_speed_mps", "horz_speed", "u", "u_mps"),
+    "vertical": (
+        "vertical",
+        "vertical_speed",
+        "vertical_speed_mps",
+        "mean_abs_vert_speed_mps",
+        "vert_speed",
+        "w",
+        "w_mps",
+    ),
+    "horizontal": (
+        "horizontal",
+        "horizontal_speed",
+        "horizontal_speed_mps",
+        "mean_horz_speed_mps",
+        "horz_speed",
+        "u",
+        "u_mps",
+    ),
     "pitch": ("pitch", "pitch_deg", "mean_pitch", "mean_pitch_deg"),
     "glide_angle": ("glide_angle", "glide_angle_deg", "gamma", "gamma_deg"),
     "buoyancy": ("buoyancy", "buoyancy_cc", "vbd_cc", "net_volume_cc"),
@@ -58,7 +74,7 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
 
     A vertical speed is needed, and the horizontal one, a glide angle or a pitch. Dives are told from climbs by
     a column of phases, or by the signs of pitch, glide angle or vertical speed, below 0 in a dive. InputError
-    where the file lacks what a fit needs, and where a value is no number or has the sign of the other phase.
+    where the file lacks what a fit needs, and where a value is not a number or has the sign of the other phase.
     """
     path = Path(file)
     header, rows = _table(path)
@@ -147,7 +163,7 @@ def _rows(reader: Iterator[list[str]], name: str, width: int) -> Iterator[tuple[
 def _found(name: str, header: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
     """The column for each of COLUMNS that there is."""
     for what, column in said.items():
-        require(what in COLUMNS, f"`{what}` is nothing that is read; choose from: {', '.join(COLUMNS)}")
+        require(what in COLUMNS, f"`{what}` is not known; choose from: {', '.join(COLUMNS)}")
         require(column in header, f"{name} has no column `{column}`; it has: {', '.join(header)}")
     found = dict(said)
     for what, usual in COLUMNS.items():
@@ -168,7 +184,7 @@ def _numbers(
         try:
             value = float(cell)
         except ValueError:
-            raise InputError(f"{where} is no number; mend it, or leave that dive out") from None
+            raise InputError(f"{where} is not a number; mend it, or leave that dive out") from None
         require(low < value < high, f"{where} must lie between {low:g} and {high:g}; mend it")
         require(value != 0, f"{where} is 0, which no dive has; leave that dive out")
         values[n] = value
@@ -179,7 +195,7 @@ def _phases(name: str, line: NDArray[np.int64], cells: Sequence[str], column: st
     for number, cell in zip(line, cells, strict=True):
         known = cell.strip().lower() in PHASES
         where = f"line {number} of {name}: {column} = {cell[:40]!r}"
-        require(known, f"{where} is no phase; choose from: {', '.join(PHASES)}")
+        require(known, f"{where} is not a phase; choose from: {', '.join(PHASES)}")
     return np.array([PHASES[cell.strip().lower()] for cell in cells])
 
 

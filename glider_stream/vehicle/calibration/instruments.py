@@ -12,12 +12,16 @@ from ..models import Glider, Seaglider, SteadyGlide
 from .dives import Dives
 
 DENSITY = 1024.0
-"""Of sea water [kg/m^3], where a model has none, to make a mass of a volume; that of the preset `slocum`."""
+"""The density of sea water [kg/m^3] that turns a volume into a mass where the model does not give one."""
 STEEP = (89.0, 89.9)
-"""A range of angles [degrees] that no coefficients in reach of a fit make infeasible."""
+"""A range of glide angles [degrees] that can be flown with any coefficients that a fit may try."""
 MASS_NODES = 3
-"""Volumes at which a glider is evaluated where each dive has its own; a polynomial in ln(volume) between."""
+"""Where each dive has its own volume, a glider is evaluated at so many volumes only.
+
+A polynomial in ln(volume) gives the values between them.
+"""
 NEAREST_STEPS = 3
+"""So many steps find the nearest point of the vehicle's curve to a dive."""
 
 
 def per_volume(base: Glider) -> float:
@@ -40,20 +44,20 @@ class Flown:
 
     def __init__(self, base: Glider, values: dict[str, float], volumes: Array) -> None:
         self.volumes = volumes
-        own = np.unique(volumes)
-        if own.size > MASS_NODES:
+        nodes = np.unique(volumes)
+        if nodes.size > MASS_NODES:
             # Chebyshev's nodes: the speed is nearly a power of the volume, the angle of attack hardly changes
-            low, high = np.log(own[[0, -1]])
+            low, high = np.log(nodes[[0, -1]])
             place = np.cos(np.pi * (np.arange(MASS_NODES) + 0.5) / MASS_NODES)
-            own = np.exp(0.5 * (low + high) + 0.5 * (high - low) * place)
-        logs, at = np.log(own), np.log(volumes)
-        self.weight = np.ones((own.size, volumes.size))
-        for n, m in np.ndindex(own.size, own.size):
+            nodes = np.exp(0.5 * (low + high) + 0.5 * (high - low) * place)
+        logs, at = np.log(nodes), np.log(volumes)
+        self.weight = np.ones((nodes.size, volumes.size))
+        for n, m in np.ndindex(nodes.size, nodes.size):
             if n != m:
                 self.weight[n] *= (at - logs[m]) / (logs[n] - logs[m])
-        self.gliders = [vehicle(base, values, volume, volume) for volume in own]
+        self.gliders = [vehicle(base, values, volume, volume) for volume in nodes]
         # a little inside, where rounding leaves a glide
-        self.flattest = max(abs(one.limits[0]) for one in self.gliders) + 1e-9
+        self.flattest = max(abs(glider.limits[0]) for glider in self.gliders) + 1e-9
 
     def within(self, angle: Array) -> Array:
         """The nearest angles that can be flown."""
@@ -61,21 +65,21 @@ class Flown:
 
     def speed(self, angle: Array) -> Array:
         """V [m/s]."""
-        speeds = [one.speed(-angle) for one in self.gliders]
+        speeds = [glider.speed(-angle) for glider in self.gliders]
         return np.asarray(np.exp((self.weight * np.log(speeds)).sum(axis=0)))
 
     def attack(self, angle: Array) -> Array:
         """The angle of attack [rad]."""
-        attacks = [one.angle_of_attack(-angle) for one in self.gliders]
+        attacks = [glider.angle_of_attack(-angle) for glider in self.gliders]
         return np.asarray((self.weight * attacks).sum(axis=0))
 
     def recorded(self, kinds: Sequence[str], angle: Array) -> Array:
         """What instruments would say, (n, kinds)."""
         speed = self.speed(angle)
-        said = {"vertical": speed * np.sin(angle), "horizontal": speed * np.cos(angle), "glide_angle": angle}
+        records = {"vertical": speed * np.sin(angle), "horizontal": speed * np.cos(angle), "glide_angle": angle}
         if "pitch" in kinds:
-            said["pitch"] = angle - self.attack(angle)
-        return np.stack([said[kind] for kind in kinds], axis=1)
+            records["pitch"] = angle - self.attack(angle)
+        return np.stack([records[kind] for kind in kinds], axis=1)
 
     def angle(self, dives: Dives) -> Array:
         """The recorded glide angles [rad], or those of the recorded pitch; as near as the vehicle can fly."""

@@ -12,18 +12,18 @@ from .dives import Dives
 from .instruments import Flown, distances
 
 SPEED_ERROR, ANGLE_ERROR = 0.01, math.radians(1.0)
-"""What a recorded speed [m/s] and angle [rad] may err by, as far as their ratio is not seen in the dives."""
+"""The assumed errors of a recorded speed [m/s] and angle [rad], where the dives do not show their ratio."""
 FINEST = 0.01
-"""Of these errors: no scatter is taken to be smaller."""
+"""The smallest scatter that is assumed, as a share of these errors."""
 REWEIGHTED = 10
-"""At most so often are instruments weighed anew."""
+"""The weights of the instruments are computed again at most so many times."""
 STEP = 1e-5
-"""Of a logarithm, for the Jacobian: far above what the models are solved to."""
+"""The step of a logarithm for the Jacobian: far above the precision of the models."""
 CLOSE = 1e-7
-"""Of logarithms and of the sum of squares: a fit is found."""
+"""A fit is found when logarithms and the sum of squares change by less than this share."""
 FURTHEST_MAIN = 3.5
 FURTHEST = {"induced_drag": 3.0, "drag_alpha2": 3.0, "lift": 1.5, "lift_alpha": 1.5}
-"""How far ln(value / preset's) may go: of a buoyancy or a parasite drag; of others."""
+"""The bounds of |ln(value / preset's value)|: first of a buoyancy or a parasite drag, then of the others."""
 
 
 @dataclass(frozen=True)
