@@ -78,8 +78,8 @@ COARSE_STEP = 6.0
 COARSE_TOLERANCE = 0.05
 """A coarse flight that lands so near its target [m], corrected by as little, needs no fine one."""
 FORESEEN = 0.02
-"""Nor does a step need a flight, from a miss of NEAR at most, if no more than that [m] is left when it shrinks the
-miss as the step before did. From further a step is less like the one before: 0.4 m were left of 1.5 m."""
+"""Nor does a step need a flight, from a miss of NEAR at most, if no more than that [m] is left when it shrinks
+the miss as the step before did. From further a step is less like the one before: 0.4 m were left of 1.5 m."""
 NEAR = 0.3
 """From so near [m] the next step lands on the target."""
 MOST_COARSE, MOST_FINE = 7, 4

@@ -207,6 +207,7 @@ def merge(parts: Sequence[str | Path], output: str | Path) -> None:
         f"the output {output} is one of the parts; name another",
     )
     with locked(target.resolve()):
+        remove_abandoned(target.resolve())
         slices = 1 if first.departures is None else first.departures.size
         tally = Tally(len(first.position) * slices, max(part.threads for _, part in heads))
         what = first.position, first.lonlat, first.provenance, Shard(1, 1), first.departures
