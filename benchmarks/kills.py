@@ -112,8 +112,7 @@ def jobs():
     found["shard from"] = [*ocean, "-o", "out.h5", "--shard", "2/3", "--from", "old.h5"], ["out.h5"]
     found["shard"] = ["build", "seed-box", "-o", "out.h5", "--shard", "1/2"], ["out.h5"]
     found["merge"] = ["merge", "part1.h5", "part2.h5", "-o", "out.h5"], ["out.h5"]
-    endings = ("json", "geojson", "kml", "gpx", "csv")
-    files = [f"out.{ending}" for ending in endings]
+    files = ["out.json", "out.csv", "out.windows.csv"]  # of a box in metres; maps' files are moved alike
     found["query"] = ["query", "road.h5", *(word for file in files for word in ("-o", file))], files
     found["plot"] = ["plot", "road.h5", "path.json", "-o", "out.png"], ["out.png"]
     found["page"] = ["plot", "road.h5", "path.json", "-o", "out.html"], ["out.html"]
@@ -147,16 +146,16 @@ def program(arguments):
     return [sys.executable, "-c", PROGRAM, *arguments, *more]
 
 
-def varied(dice, name, arguments):
-    """Now and then the same build without its older roadmap, or on another."""
-    if "from" not in name or dice.random() < 0.6:
+def varied(dice, name, arguments, begun):
+    """Of a build that has begun, now and then the same without its older roadmap, or on another."""
+    if "from" not in name or not begun or dice.random() < 0.6:
         return arguments, False
     at = arguments.index("--from")
     other = ["--from", "older.h5"] if dice.random() < 0.5 else []
     return [*arguments[:at], *other, *arguments[at + 2 :]], True
 
 
-def stopped(dice, folder, arguments, seconds):
+def stopped(dice, folder, arguments, seconds, patience):
     """Run a command and stop it at a random moment: its exit code, what it said, and whether it was stopped."""
     late = dice.random() < 1 / 3
     with subprocess.Popen(
@@ -165,9 +164,9 @@ def stopped(dice, folder, arguments, seconds):
         if late:
             while running.poll() is None and not list(folder.glob(".out.*")):
                 time.sleep(0.0005)
-            time.sleep(0.02 * dice.random())
+            time.sleep(0.02 * patience * dice.random())
         else:
-            time.sleep(seconds * (0.1 + dice.random()))
+            time.sleep(seconds * patience * (0.1 + dice.random()))
         killed = running.poll() is None
         if killed:
             running.send_signal(dice.choice(SIGNALS))
@@ -184,11 +183,12 @@ def tried(number, folder, whole, seconds):
     faults = []
     for left in folder.glob("*out.*"):
         left.unlink()
-    for _ in range(60):
-        command, alien = varied(dice, name, arguments)
-        journal = folder / "out.h5.journal"
+    journal = folder / "out.h5.journal"
+    for attempt in range(60):
         before = journal.read_bytes() if journal.exists() else b""
-        code, said, killed = stopped(dice, folder, command, seconds[name])
+        command, alien = varied(dice, name, arguments, bool(before))
+        # on a busy machine the time of an unbroken run is never enough
+        code, said, killed = stopped(dice, folder, command, seconds[name], 1.0 + attempt / 4)
         kills += killed
         resumed += bool(before)
         for output in outputs:

@@ -146,6 +146,9 @@ ROUTE_OPTIONS = (
     click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most."),
     click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most."),
     click.option(
+        "--polish", is_flag=True, help="Move the stops off the nodes, cut legs, count yos anew, while it pays."
+    ),
+    click.option(
         "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
     ),
     click.option(
@@ -211,6 +214,7 @@ def _answer(
     most_energy: float | None,
     most_yos: int | None,
     most_hours: float | None,
+    polish: bool,
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
@@ -233,16 +237,16 @@ def _answer(
     answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    alone = not outputs and most_energy is None and thin is None and not asked and not as_card
+    alone = not (outputs or polish or asked or as_card) and most_energy is None and thin is None
     if front and (departures or not alone):
         raise click.UsageError(
-            "--trade-off goes with none of --output, --most-energy, --thin, --card, --window-hours, "
-            "--waypoints, --arrival-radius, --depart-between and --arrive-by; leave one of them out"
+            "--trade-off goes with none of --output, --most-energy, --polish, --thin, --card, "
+            "--window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave some out"
         )
     if departures and not alone:
         raise click.UsageError(
-            "--depart-between and --arrive-by go with none of --output, --most-energy, --thin, --card, "
-            "--window-hours, --waypoints and --arrival-radius; set query.departure to what they find"
+            "--depart-between and --arrive-by go with none of --output, --most-energy, --polish, --thin, "
+            "--card, --window-hours, --waypoints and --arrival-radius; set query.departure to what they find"
         )
     if not departures and (every is not None or figure is not None):
         raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
@@ -258,7 +262,14 @@ def _answer(
             check_export(output)
         source = opened()
         path = source.query(
-            start, goal, outputs=outputs, most_energy=most_energy, thin=thin, surfacing=rule, **asked
+            start,
+            goal,
+            outputs=outputs,
+            most_energy=most_energy,
+            polish=polish,
+            thin=thin,
+            surfacing=rule,
+            **asked,
         )
         for note in path.notes:
             say(f"note: {note}", error=True)

@@ -101,6 +101,7 @@ class OpenedScenario:
         *,
         outputs: Sequence[str | File] = (),
         most_energy: float | None = None,
+        polish: bool = False,
         thin: float | None = None,
         surfacing: Surfacing | None = None,
         window_hours: float = HOURS,
@@ -109,11 +110,12 @@ class OpenedScenario:
     ) -> Path:
         """The cheapest path between two points, written to each of `outputs`.
 
-        `most_energy` [J] asks for the fastest of the paths of `trade_off` that uses no more. `thin` [m] joins
-        legs whose stops lie so near the straight line, where one glide does, and none where that breaks
-        another rule. `surfacing` is a rule for how often to come up; the scenario's own if None. Exported
-        windows last `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within
-        `arrival_radius` [m], each vehicle's usual one if None; `notes` of the path say what else became of files.
+        `most_energy` [J] asks for the fastest of the paths of `trade_off` that uses no more. `polish` moves the
+        stops off the nodes, cuts legs and counts yos anew, as long as the cost falls. `thin` [m] joins legs whose
+        stops lie so near the straight line, where one glide does, and none where that breaks another rule.
+        `surfacing` is a rule for how often to come up; the scenario's own if None. Exported windows last
+        `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within `arrival_radius` [m],
+        each vehicle's usual one if None; `notes` of the path say what else became of files.
 
         Examples:
             >>> path = road.query((-190, 190, 0), (100, -100, -75), thin=20)
@@ -122,7 +124,8 @@ class OpenedScenario:
         """
         for output in outputs:
             check_export(output)
-        path = best_path(self.planner(surfacing), self._ends(start, goal), most_energy=most_energy, thinned=thin)
+        planner, ends = self.planner(surfacing), self._ends(start, goal)
+        path = best_path(planner, ends, most_energy=most_energy, polish=polish, thinned=thin)
         check_legs(path, outputs)
         notes: list[str] = []
         written = {

@@ -194,6 +194,7 @@ def query(
     window_hours: float = HOURS,
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
+    polish: bool = False,
 ) -> Path:
     """The cheapest path between two points, see `OpenedRoadmap.query`.
 
@@ -211,6 +212,7 @@ def query(
         goal,
         outputs=outputs,
         most_energy=most_energy,
+        polish=polish,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
@@ -230,6 +232,7 @@ def plan(
     window_hours: float = HOURS,
     *,
     overrides: Sequence[str] = (),
+    polish: bool = False,
 ) -> Path:
     """The cheapest path of a scenario without a roadmap; all else as in `query`.
 
@@ -245,6 +248,7 @@ def plan(
         goal,
         outputs=outputs,
         most_energy=most_energy,
+        polish=polish,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,

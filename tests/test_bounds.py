@@ -139,12 +139,12 @@ def test_lists_and_claims_in_a_roadmap(road):
         del file["edges/time"]
         lists = file.create_dataset("edges/time", (size,), h5py.vlen_dtype(np.float64))
         lists[0] = np.zeros(1000)
-    with pytest.raises(InputError, match=r"`time` in .* holds lists of uneven lengths"):
+    with pytest.raises(InputError, match=r"`edges/time` in .* holds lists of uneven lengths"):
         read_roadmap("road.h5")
     with h5py.File("road.h5", "r+") as file:
         del file["edges/time"]
         file.create_dataset("edges/time", (10**12,), np.float64, chunks=(10**6,))
-    with pytest.raises(InputError, match=r"`time` claims 8e\+12 bytes, which 0 cannot hold"):
+    with pytest.raises(InputError, match=r"`edges/time` claims 8e\+12 bytes, which 0 cannot hold"):
         read_roadmap("road.h5")
 
 

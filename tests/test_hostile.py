@@ -228,7 +228,7 @@ def claiming(path, name, shape):
 def test_a_header_that_claims_much(good, tmp_path):
     shutil.copy(good / "road.h5", tmp_path / "road.h5")
     claiming(tmp_path / "road.h5", "nodes/position", (10**12, 3))
-    with pytest.raises(InputError, match=r"`position` claims 2\.4e\+13 bytes"):
+    with pytest.raises(InputError, match=r"`nodes/position` claims 2\.4e\+13 bytes"):
         bounded_raises(read_roadmap, tmp_path / "road.h5")
     shutil.copy(good / "four.nc", tmp_path / "four.nc")
     with h5py.File(tmp_path / "four.nc", "r+") as file:

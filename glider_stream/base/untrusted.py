@@ -68,7 +68,7 @@ def check_links(path: str | Path) -> None:
                         inside,
                         f"the data of `{name}` in {path} lie in other files, which are not read: copy them in",
                     )
-                    _check_storage(path, name, item)
+                    _check_storage(path, str(item.name).lstrip("/"), item)
 
 
 def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:

@@ -197,6 +197,7 @@ def merge(parts: Sequence[str | Path], output: str | Path) -> None:
         f"the output {output} is one of the parts; name another",
     )
     with locked(target.resolve()):
+        remove_abandoned(target.resolve())
         tally = Tally(len(first.position), max(part.threads for _, part in heads))
         with writing(target, first.position, first.lonlat, first.provenance, Shard(1, 1)) as file:
             for _, path in sorted(seen.items()):

@@ -1,4 +1,4 @@
-"""What a query may ask for beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs."""
+"""What a query may ask beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs, a polish."""
 
 from dataclasses import replace
 
@@ -11,7 +11,9 @@ from ..roadmap.roadmap import Roadmap
 from ..water.inspect import is_steady
 from .assembly import RoutePlanner
 from .layered import SurfacingPlanner
+from .moves import improve
 from .path import SURFACE, Path
+from .polish import Polisher
 from .query import Planner
 from .surfacing import Surfacing
 from .thin import thin
@@ -36,18 +38,27 @@ def planner_of(problem: Problem, roadmap: Roadmap | None, rule: Surfacing) -> Ro
 
 
 def best_path(
-    planner: RoutePlanner, ends: Ends, *, most_energy: float | None = None, thinned: float | None = None
+    planner: RoutePlanner,
+    ends: Ends,
+    *,
+    most_energy: float | None = None,
+    polish: bool = False,
+    thinned: float | None = None,
 ) -> Path:
     """The cheapest path; within `most_energy` [J] the fastest; with `thinned` [m] of fewer legs, where they hold.
 
-    InputError where `most_energy` is asked of a roadmap that has no energies.
+    With `polish` its stops are moved until nothing near costs less. InputError where `most_energy` is asked of a
+    roadmap that has no energies, or with `polish`.
     """
+    both = polish and most_energy is not None
+    require(not both, "a route within a bound on energy is not polished: that makes its cost less, not its time")
     if most_energy is None:
         path = planner.query(*ends)
     else:
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
         _check_energy(planner)
         path = planner.within(*ends, most_energy)
+    path = polished(path, planner) if polish else path
     return path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
 
 
@@ -71,3 +82,24 @@ def with_fewer_legs(path: Path, tolerance: float, planner: RoutePlanner, most_en
     fewer = thin(path, tolerance, planner.connect, planner.fly, stays)
     keeps = rule.holds(fewer) and (most_energy is None or fewer.cost <= most_energy)
     return fewer if keeps else replace(path, unthinned=fewer.unthinned)
+
+
+def polished(path: Path, planner: RoutePlanner) -> Path:
+    """A path with its stops moved, its legs cut and its yos counted anew; as it is where that gains nothing.
+
+    Stops at the surface stay there where a rule of surfacing asks for them, and in a geographic scenario, where a
+    vehicle's files are made of them.
+    """
+    if not path.legs:
+        return path
+    problem, rule = planner.problem, planner.rule
+    bound = rule != Surfacing()
+    fixed = bound or problem.to_lonlat is not None
+    stays = (lambda stop: bool(stop[2] >= -SURFACE)) if fixed else (lambda stop: False)
+    polisher = Polisher.of(problem, path, stays=stays, frozen=planner.assembly.frozen, single_yos=not bound)
+    kept = replace(path, unpolished=(len(path.legs), path.travel_time, path.cost))
+    chain = polisher.chain_of(path)
+    if chain is None:
+        return kept
+    better = replace(planner.fly(polisher.hops(improve(polisher, chain))), unpolished=kept.unpolished)
+    return better if better.cost < path.cost and rule.holds(better) else kept

@@ -100,7 +100,8 @@ class Path:
     for JSON, if that is known; `notes` on files written of it. `departure` [s]: the flow's time at which it
     begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
     `expanded`: the share of the nodes from which the search looked for legs, where it did.
-    `unthinned`: how many legs and seconds it had before it was thinned.
+    `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds and
+    what cost before it was polished.
 
     Examples:
         >>> path = road.query()
@@ -119,6 +120,7 @@ class Path:
     unit: str = "s"
     why: str = ""
     unthinned: tuple[int, float] | None = None
+    unpolished: tuple[int, float, float] | None = None
     why_not: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
     departure: float | None = None
@@ -164,6 +166,7 @@ class Path:
             "cost": self.cost if self.found else None,
             **energy,
             **thinned,
+            **self._before_polishing(),
             **({} if self.departure is None else {"departure_s": self.departure, "frozen": self.frozen}),
             **({} if self.expanded is None else {"expanded_share": self.expanded}),
             **({} if self.found or not self.why else {"why": self.why}),
@@ -171,6 +174,12 @@ class Path:
             **({"notes": list(self.notes)} if self.notes else {}),
             "legs": [leg.as_dict() for leg in self.legs],
         }
+
+    def _before_polishing(self) -> dict[str, Any]:
+        if self.unpolished is None:
+            return {}
+        legs, time, cost = self.unpolished
+        return {"unpolished": {"legs": legs, "travel_time_s": time, "cost": cost}}
 
     def __str__(self) -> str:
         if self.lonlat is None:
@@ -187,6 +196,10 @@ class Path:
         title = f"path from {start} to {goal}: {count}, {span(self.travel_time)}{arrives}{energy}"
         if self.unthinned is not None:
             title += f"; before it was thinned {self.unthinned[0]}, {span(self.unthinned[1])}"
+        if self.unpolished is not None:
+            legs, time, cost = self.unpolished
+            title += f"; before it was polished {legs}, {span(time)}"
+            title += f", {cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         if self.frozen:
             title += f"; {FROZEN}"
         return "\n".join([title, *(f"  {leg.told(self.departs)}" for leg in self.legs)])

@@ -1,0 +1,315 @@
+"""Polishing: a route's stops moved, its legs cut and its yos counted anew, until nothing near is quicker.
+
+A route is its stops: the leg between two of them is the one exact glide that joins them, whose time is a smooth
+function T(p, q, t) of its ends and its departure. The cost of the route is the sum of its legs', each of which
+leaves when the last one arrives, and Newton's method makes it least: its second derivatives are blocks along
+the diagonal, since a stop meets two legs alone. Every iterate is a route that can be flown.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, solveh_banded
+
+from ..base.arrays import Array
+from ..kernels.edges import Edge, Status
+from ..roadmap.problem import Problem
+from .glides import Air, Glides, Slopes
+from .path import Hop, Path
+
+LEAST_RISE = 0.05
+"""A polished leg dives or climbs at least so much of the domain's depth, or SHORTER of the shortest leg that the
+route had: else a route would hold the depth of the best current by ever smaller yos, which no vehicle flies."""
+SHORTER = 0.5
+BARRIERS = (1e-4, 5e-6)
+"""Weights, in turn, of the barrier that keeps legs off the ends of the glide polar, of the horizon and
+of the least rise, in shares of the route's cost: it moves an optimum away from such an end by about so much."""
+NEARER = 0.1
+"""In one step a leg comes nearer to such an end to this share of its distance at most."""
+CURVED = (20.0, 20.0, 8.0)
+"""By how much a stop is moved to measure second derivatives, along x, y, z [m]: wide enough to look over
+the kinks of a grid, where first derivatives bend."""
+ENOUGH = 3e-5
+"""A step that gains a smaller share of the cost is a small one."""
+SMALL_STEPS = 2
+"""So many small steps, one after the other, are the last ones: a single one may lie at a kink."""
+MOST_MOVES = 30
+SHORTENED = 6
+"""How often a step is halved where its route cannot be flown or gains nothing."""
+DAMPED, FREED = 10.0, 0.1
+"""Factors of the damping where a step fails, and where it does not."""
+STIFF = 1e3
+"""Damping that moves nothing any more."""
+FAR = 0.5
+"""A stop moves at most so much of the longer of its legs in one step."""
+
+
+class Chain(NamedTuple):
+    """A route as it is polished: stops (n + 1, 3) [m], the legs between them, its cost."""
+
+    stops: Array
+    glides: Glides
+    cost: float
+
+
+@dataclass(frozen=True)
+class Polisher:
+    """Makes routes of a problem better.
+
+    `stays` says of a stop whether it keeps its depth; `frozen`: every leg meets the current of the departure;
+    `single_yos`: whether yos may be put into single legs, with a top under water; `least_rise` [m] of a leg.
+    """
+
+    problem: Problem
+    stays: Callable[[Array], bool] = lambda stop: False
+    frozen: bool = False
+    single_yos: bool = True
+    least_rise: float = 1.0
+
+    @classmethod
+    def of(cls, problem: Problem, path: Path, **how: Any) -> "Polisher":
+        """With the least rise that fits a path."""
+        shortest = min(abs(float(leg.end[2] - leg.start[2])) for leg in path.legs)
+        depth = float(problem.hi[2] - problem.lo[2])
+        return cls(problem, least_rise=min(LEAST_RISE * depth, SHORTER * shortest), **how)
+
+    @property
+    def air(self) -> Air:
+        """The legs."""
+        return Air(self.problem.evaluator)
+
+    def glide(self, stops: Array, angle: Array, heading: Array) -> Glides:
+        """The legs between stops, each leaving when the last one arrives, or all alike if frozen."""
+        departs = self.problem.departure
+        left = np.full(len(angle), departs) if self.frozen else departs
+        return self.air.glide(stops[:-1], stops[1:], angle, heading, left)
+
+    def chain(self, stops: Array, angle: Array, heading: Array) -> Chain | None:
+        """The route through stops, from a guess of its controls; None where it cannot be flown."""
+        glides = self.glide(stops, angle, heading)
+        if not (glides.exact.all() and self._within(stops, glides).all()):
+            return None
+        return Chain(stops, glides, self.cost(stops, glides))
+
+    def chain_of(self, path: Path) -> Chain | None:
+        """A path as it is polished: its legs end exactly, each leaves when the last one arrives."""
+        stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)])
+        angle = np.array([abs(leg.glide_angle) for leg in path.legs])
+        return self.chain(stops, angle, np.array([leg.heading for leg in path.legs]))
+
+    def hops(self, chain: Chain) -> list[Hop]:
+        """The legs of a route, for a path to be made of."""
+        stops, glides, price = chain.stops, chain.glides, self.problem.evaluator.cost.kernel()
+        climbs = np.diff(stops[:, 2]) > 0
+        speed = self.air.speed(glides.angle, climbs)
+        legs = []
+        for n, time in enumerate(glides.time.tolist()):
+            angle = float(glides.angle[n] if climbs[n] else -glides.angle[n])
+            heading = math.remainder(float(glides.heading[n]), math.tau)
+            cost = price.per_second * time + price.per_leg
+            control = angle, heading, float(speed[n]), float(glides.miss[n])
+            legs.append((stops[n], stops[n + 1], Edge(int(Status.CONNECTED), time, cost, *control)))
+        return legs
+
+    def cost(self, stops: Array, glides: Glides) -> float:
+        """The scenario's own cost of a route, its turns included."""
+        price = self.problem.evaluator.cost.kernel()
+        legs = price.per_second * float(glides.time.sum()) + price.per_leg * len(glides.time)
+        return legs + float(self._pumped(stops[:-1, 2])[self._turns(stops)].sum())
+
+    def polish(self, chain: Chain, moves: int = MOST_MOVES) -> Chain:
+        """Newton's method on the stops between start and goal, at most so many moves for each barrier."""
+        first = chain
+        for weight in BARRIERS:
+            damping, small = 1e-3, 0
+            for _ in range(moves if len(chain.stops) > 2 else 0):
+                better, damping = self._step(chain, weight * chain.cost, damping)
+                if better is None:
+                    break
+                gain, chain = chain.cost - better.cost, better
+                small = small + 1 if abs(gain) < ENOUGH * chain.cost else 0
+                if small == SMALL_STEPS:
+                    break
+        return min(first, chain, key=lambda one: one.cost)  # the barrier may have moved it the wrong way
+
+    def _step(self, chain: Chain, weight: float, damping: float) -> tuple[Chain | None, float]:
+        """A Newton step, damped as far as it must be: a better route, if there is one, and the next damping."""
+        step = _Step.of(self, chain, weight)
+        while damping < STIFF:
+            better = self._along(chain, step.move(damping), weight)
+            if better is not None:
+                return better, max(damping * FREED, 1e-6)
+            damping *= DAMPED
+        return None, damping
+
+    def merit(self, chain: Chain, weight: float) -> float:
+        """The cost and the barrier."""
+        room, _ = self._room(chain.stops, chain.glides, None)
+        return chain.cost - weight * float(np.log(room).sum())
+
+    def _along(self, chain: Chain, move: Array, weight: float) -> Chain | None:
+        """A better route along a move of the stops (n + 1, 3); stops whose legs cannot be flown move less."""
+        before, share = self.merit(chain, weight), np.ones(len(chain.stops))
+        room = self._room(chain.stops, chain.glides, None)[0]
+        for _ in range(SHORTENED):
+            stops = self._held(chain.stops + share[:, None] * move)
+            stops = np.where((share > 0)[:, None], stops, chain.stops)
+            glides = self.glide(stops, chain.glides.angle, chain.glides.heading)
+            bad = ~self._within(stops, glides)
+            bad |= (self._room(stops, glides, None)[0] < NEARER * room).any(axis=1)
+            if bad.any():
+                at = np.zeros(len(stops), np.bool_)
+                at[:-1] |= bad
+                at[1:] |= bad
+                share = np.where(at, 0.4 * share, share)
+                continue
+            after = Chain(stops, glides, self.cost(stops, glides))
+            if self.merit(after, weight) < before:
+                return after
+            share *= 0.4
+        return None
+
+    def _held(self, stops: Array) -> Array:
+        stops = stops.copy()
+        stops[1:-1, 2] = np.clip(stops[1:-1, 2], self.problem.lo[2], min(0.0, float(self.problem.hi[2])))
+        return stops
+
+    def _within(self, stops: Array, glides: Glides) -> NDArray[np.bool_]:
+        """Which legs (n,) may be flown: in water, within the horizon, neither too short nor turned round."""
+        integration = self.problem.evaluator.integration
+        short = np.abs(np.diff(stops[:, 2])) < self.least_rise
+        late = glides.time > integration.dt * integration.steps
+        late |= glides.departs + glides.time > self.problem.evaluator.flow.extent.t_hi
+        fits = glides.exact & ~short & ~late & np.isfinite(glides.time)
+        return self.air.fit(stops[:-1], stops[1:], glides) if fits.all() else np.asarray(fits, np.bool_)
+
+    def _room(self, stops: Array, glides: Glides, slopes: Slopes | None) -> tuple[Array, Array]:
+        """How far legs are from what they must keep (n, 4), in shares; its slopes (n, 4, 6) by their ends."""
+        rise = np.diff(stops[:, 2])
+        climbs = rise > 0
+        lowest, highest = self.air.angles(climbs)
+        span = highest - lowest
+        horizon = self.problem.evaluator.integration.dt * self.problem.evaluator.integration.steps
+        depth = float(self.problem.hi[2] - self.problem.lo[2])
+        room = np.stack(
+            [
+                (glides.angle - lowest) / span,
+                (highest - glides.angle) / span,
+                1 - glides.time / horizon,
+                (np.abs(rise) - self.least_rise) / depth,
+            ],
+            axis=1,
+        )
+        by = np.zeros((len(rise), 4, 6))
+        if slopes is not None:
+            by[:, 0] = slopes.angle[:, :6] / span[:, None]
+            by[:, 1] = -by[:, 0]
+            by[:, 2] = -slopes.time[:, :6] / horizon
+            by[:, 3, 2], by[:, 3, 5] = -np.sign(rise) / depth, np.sign(rise) / depth
+        return np.maximum(room, 0.0) + 1e-7, by
+
+    def _turns(self, stops: Array) -> NDArray[np.bool_]:
+        """At which legs' starts (n,) a dive turns into a climb; a route begins as if it had dived."""
+        climbs = np.diff(stops[:, 2]) > 0
+        return np.asarray(climbs & ~np.concatenate([[False], climbs[:-1]]), np.bool_)
+
+    def _pumped(self, z: Array) -> Array:
+        pumped = self.problem.evaluator.cost.inflection(z)
+        return np.zeros(len(z)) if pumped is None else np.asarray(pumped, np.float64)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Gradient (n - 1, 3) and second derivatives, banded, of a route's cost by its inner stops; what is free."""
+
+    gradient: Array
+    band: Array
+    free: NDArray[np.bool_]
+    longest: Array
+
+    @classmethod
+    def of(cls, polisher: Polisher, chain: Chain, weight: float) -> "_Step":
+        """Of a route, with a barrier of this weight."""
+        stops, glides = chain.stops, chain.glides
+        slopes = polisher.air.slopes(stops[:-1], stops[1:], glides)
+        price = polisher.problem.evaluator.cost.kernel().per_second
+        # what a second's delay at each leg's end costs: the legs after it leave later
+        late = np.zeros(len(glides.time) + 1)
+        for n in range(len(glides.time) - 1, -1, -1):
+            by_delay = 0.0 if polisher.frozen else slopes.time[n, 6]
+            late[n] = late[n + 1] + (price + late[n + 1]) * by_delay
+        worth = price + late[1:]
+        room, by = polisher._room(stops, glides, slopes)
+        leg = worth[:, None] * slopes.time[:, :6] - weight * (by / room[:, :, None]).sum(axis=1)
+        bent = worth[:, None, None] * cls._curvature(polisher, stops, glides, slopes)
+        bent = bent + weight * np.einsum("nci,ncj->nij", by / room[:, :, None] ** 2, by)
+        turns = polisher._turns(stops)
+        up, down = (polisher._pumped(stops[:-1, 2] + sign) for sign in (1.0, -1.0))
+        leg[:, 2] += np.where(turns, (up - down) / 2, 0.0)
+        gradient = leg[1:, :3] + leg[:-1, 3:]
+        size = gradient.size
+        band = np.zeros((6, size))  # as solveh_banded takes a lower one
+        count = len(gradient)
+        for n in range(count):
+            block = bent[n, 3:, 3:] + bent[n + 1, :3, :3]
+            for i in range(3):
+                for j in range(i + 1):
+                    band[i - j, 3 * n + j] = block[i, j]
+            if n + 1 < count:
+                for i in range(3):
+                    for j in range(3):
+                        band[3 + i - j, 3 * n + j] = bent[n + 1, 3 + i, j]
+        lowest, highest = polisher.problem.lo[2], min(0.0, float(polisher.problem.hi[2]))
+        between, free = stops[1:-1], np.ones_like(gradient, np.bool_)
+        lies, floats = between[:, 2] <= lowest + 1e-9, between[:, 2] >= highest - 1e-9
+        free[:, 2] = ~((lies & (gradient[:, 2] > 0)) | (floats & (gradient[:, 2] < 0)))
+        free[:, 2] &= ~np.array([polisher.stays(stop) for stop in between], np.bool_)
+        length = np.abs(np.diff(stops, axis=0))
+        reach = np.maximum(np.linalg.norm(length[:-1], axis=1), np.linalg.norm(length[1:], axis=1))
+        return cls(gradient, band, free, FAR * reach)
+
+    @staticmethod
+    def _curvature(polisher: Polisher, stops: Array, glides: Glides, slopes: Slopes) -> Array:
+        """Second derivatives (n, 6, 6) of each leg's time by its own ends, by differences of the first."""
+        ends, count = np.concatenate([stops[:-1], stops[1:]], axis=1), len(stops) - 1
+        rise, climbs = np.abs(np.diff(stops[:, 2])), np.diff(stops[:, 2]) > 0
+        moved, steps = np.tile(ends, (6, 1, 1)), np.empty((6, count))
+        for n in range(6):
+            steps[n] = CURVED[n % 3]
+            if n % 3 == 2:
+                # a leg is moved apart, not together: it stays a dive or a climb
+                steps[n] = np.where(climbs == (n == 5), 1.0, -1.0) * np.minimum(steps[n], 0.2 * rise)
+            moved[n, :, n] += steps[n]
+        there = moved[..., :3].reshape(-1, 3), moved[..., 3:].reshape(-1, 3)
+        angle, heading, departs = (np.tile(one, 6) for one in (glides.angle, glides.heading, glides.departs))
+        beside = polisher.air.glide(*there, angle, heading, departs)
+        change = polisher.air.slopes(*there, beside).time[:, :6].reshape(6, count, 6) - slopes.time[:, :6]
+        change = np.where(beside.exact.reshape(6, count, 1), change / steps[..., None], 0.0)
+        bent = change.transpose(1, 0, 2)
+        return np.asarray(0.5 * (bent + bent.transpose(0, 2, 1)))
+
+    def move(self, damping: float) -> Array:
+        """The step (n + 1, 3) [m] of all stops; longer ones are cut."""
+        band, free = self.band.copy(), self.free.ravel()
+        gradient = np.where(free, self.gradient.ravel(), 0.0)
+        for n in range(1, 6):
+            both = free[n:] & free[:-n] if len(free) > n else np.zeros(0, np.bool_)
+            band[n, : len(both)] = np.where(both, band[n, : len(both)], 0.0)
+        scale = np.abs(self.band[0])
+        band[0] = np.where(free, band[0] + damping * np.maximum(scale, scale.mean()), 1.0)
+        shift = 0.0
+        while True:
+            try:
+                step = solveh_banded(band, -gradient, lower=True)
+                break
+            except LinAlgError:
+                shift = max(2 * shift, 1e-2)
+                band[0] = np.where(free, band[0] + shift * np.maximum(scale, scale.mean()), 1.0)
+        move: Array = step.reshape(-1, 3)
+        length = np.linalg.norm(move, axis=1)
+        move = move * np.minimum(1.0, self.longest / np.maximum(length, 1e-12))[:, None]
+        return np.concatenate([np.zeros((1, 3)), move, np.zeros((1, 3))])
