@@ -128,11 +128,11 @@ def file_route(name: str, scenario: Scenario) -> dict[str, Any]:
 
 
 def washington(file: str) -> Scenario:
-    """A day and more along the coast in a three-hourly forecast."""
+    """Two days along the coast in a three-hourly forecast: its currents outrun the glider, which drifts about."""
     return read_scenario("ionian", [
-        f"flow.file={file}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-125.9,-125.5]",
-        "domain.lat=[46.8,47.9]", "sampling.shape=[26,98,2]", "query.start=[-125.6,46.9,0.0]",
-        "query.goal=[-125.6,47.85,0.0]",
+        f"flow.file={file}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-126.1,-125.4]",
+        "domain.lat=[46.9,47.7]", "sampling.shape=[30,52,2]", "query.start=[-125.75,47.2,0.0]",
+        "query.goal=[-125.75,47.5,0.0]",
     ])  # fmt: skip
 
 

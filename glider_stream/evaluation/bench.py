@@ -38,7 +38,7 @@ from ..water.sampled import sample_flow
 
 STEPS, FLIGHTS, AT_ONCE = 60, 16_384, 256
 """RK4 steps of a flight of the raw integrator, flights in batches of LANES, batches a thread takes at once."""
-METHODS = {
+RATED = {
     "streamline 16, 27 nearest": (),
     "surface 16, 27 nearest": ("steering.method=surface",),
     "flow map, 27 nearest": ("steering.method=flow-map",),
@@ -205,7 +205,7 @@ def _ceiling(program: str | Path) -> float:
 def methods(runs: int, quick: bool) -> Iterator[Figure]:
     """Pairs per second by method and law, on the seed box; compilation left out."""
     shape = "[5,5,3]" if quick else "[16,16,4]"
-    for name, overrides in METHODS.items():
+    for name, overrides in RATED.items():
         yield Figure(name, "pairs/s", tuple(_rate(overrides, shape) for _ in range(runs)))
 
 
@@ -215,8 +215,8 @@ def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
     for name in ("streamline 16, all", "flow map, all"):
         ratios = []
         for _ in range(runs):
-            single = _rate(METHODS[name], shape, 1)
-            ratios.append(_rate(METHODS[name], shape) / single)
+            single = _rate(RATED[name], shape, 1)
+            ratios.append(_rate(RATED[name], shape) / single)
         yield Figure(f"all threads over one: {name}", "times", tuple(ratios))
 
 

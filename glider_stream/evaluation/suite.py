@@ -28,7 +28,7 @@ from .baselines import BASELINES
 from .bench import made_by
 from .brute_force import fastest_legs
 
-METHODS: dict[str, Method] = {
+COMPARED: dict[str, Method] = {
     "flow-map": FlowMapMethod(),
     "streamline": StreamlineMethod(16),
     "surface": SurfaceMethod(16),
@@ -185,7 +185,7 @@ def run_suite(
     with threads(None) as count:
         for name in chosen:
             problem = read_scenario(name, [LAW]).problem()
-            roads = {method: _with(problem, steering) for method, steering in METHODS.items()}
+            roads = {method: _with(problem, steering) for method, steering in COMPARED.items()}
             built = {method: build_roadmap(case) for method, case in roads.items()}
             planners = {method: planner_of(roads[method], road, Surfacing()) for method, road in built.items()}
             outcomes += [_outcome(name, method, built[method], planner) for method, planner in planners.items()]
@@ -193,7 +193,7 @@ def run_suite(
             position = built["flow-map"].position
             completeness[name] = _completeness(roads["flow-map"], position, 2 if quick else 16)
             attempts += _attempts(name, problem, planners, 2 if quick else pairs, 256 if quick else DENSE)
-            progress(f"{name}: {outcomes[-len(METHODS) - len(BASELINES)].travel_time:,.0f} s")
+            progress(f"{name}: {outcomes[-len(COMPARED) - len(BASELINES)].travel_time:,.0f} s")
     return Report(chosen, tuple(outcomes), tuple(attempts), completeness, made_by(count, quick))
 
 

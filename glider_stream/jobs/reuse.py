@@ -19,7 +19,6 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import provenance_of
 from ..roadmap.roadmap import Roadmap
 from ..roadmap.slices import SlicedRoadmap
-from ..roadmap.steering import FlowMapMethod
 
 SIDE = 480
 """Cells along the longer side of the lattice that times are bounded on."""
@@ -149,7 +148,7 @@ class _Lattice:
         at = np.clip(((self.position[:, :2] - self.low) / self.step).astype(np.int64), 0, self.count - 1)
         soonest = self._soonest(changed)[at[:, 0], at[:, 1]]
         safe = soonest > self.horizon
-        straight = not isinstance(self.now.evaluator.steering, FlowMapMethod)
+        straight = not self.now.evaluator.exact
         # the stream value is read along the straight line
         gap = distance_transform_edt(~changed)[at[:, 0], at[:, 1]] * self.step - 2 * self.step
         legs = self.now.legs(self.position)

@@ -9,6 +9,7 @@ from ..base.arrays import Array
 from ..base.settings import require
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..search.path import SURFACE
 from ..water.inspect import is_steady
 from .canvas import (
     GREY,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 MAX_MAPS, MAX_NUMBERS, ARROWS = 4, 40, 44
 MAPS_ROOM = 4.9, 5.6  # inches across and up
 LONGEST_ARROW = 0.4  # inches, in the profile
-SURFACED = 0.02  # of the deepest depth: a leg that ends above it ends at the surface
 
 
 def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) -> Array:
@@ -129,7 +129,7 @@ def _draw_flight(ax: Any, frame: Frame, rows: Array, stops: Array, norm: Any) ->
     ax.plot(*line.T, color="white", linewidth=4.2, zorder=4)
     ax.add_collection(_route(line, line[:, 2], norm, 2.6))
     between = ends[1:-1]
-    up = between[:, 2] <= SURFACED * frame.bottom
+    up = between[:, 2] <= SURFACE
     for mask, marker, label in ((~up, "o", "end of a leg"), (up, "^", "surfacing")):
         if mask.any():
             look = {"edgecolors": INK, "facecolors": "white", "linewidths": 0.9, "depthshade": False}

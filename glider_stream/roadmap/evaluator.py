@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import in_parallel
-from ..kernels import connect, control, edges, fan, flow, motion, refine, terrain
+from ..kernels import connect, control, edges, fan, flow, motion, terrain
 from ..kernels.connect import Pairs
 from ..kernels.edges import EDGE_COLUMNS, STATUS, Edge, Status, edge_of
 from ..kernels.patch import Nodes
@@ -18,7 +18,7 @@ from ..kernels.reach import LEG_COLUMNS, LEG_EDGE, LEG_NODE, Legs, Points, answe
 from ..vehicle.cost import Cost, TravelTime
 from ..water.inspect import is_steady
 from .bins import node_bins
-from .steering import FlowMapMethod, IntegrationSettings, Method, StreamlineMethod
+from .steering import FlowMapMethod, IntegrationSettings, Method
 
 NODES_AT_ONCE = 16
 """Source nodes that a thread takes at once: few, since their work differs a hundredfold."""
@@ -63,15 +63,12 @@ class Evaluator:
             inside = index.size == 0 or (index.min() >= 0 and index.max() < len(nodes))
             require(inside, f"`{name}` must hold node numbers below {len(nodes)}; got others")
         pairs = Pairs(nodes, departs, sources, rows, targets)
-        result: Array
-        if isinstance(self.steering, FlowMapMethod):
-            result = self._connect_by_fan(pairs)
-        else:
-            result = np.empty((targets.size, EDGE_COLUMNS))
-            refines = isinstance(self.steering, StreamlineMethod) and self.steering.refine
-            kernel = refine.refine_nodes if refines else connect.connect_nodes
-            task = partial(kernel, self.medium, self.steering.kernel(), pairs, result)
-            in_parallel(task, sources.size, NODES_AT_ONCE)
+        connector = self.steering.connector
+        if connector is None:
+            return self._connect_by_fan(pairs)
+        result = np.empty((targets.size, EDGE_COLUMNS))
+        task = partial(connector, self.medium, self.steering.kernel(), pairs, result)
+        in_parallel(task, sources.size, NODES_AT_ONCE)
         return result
 
     def _connect_by_fan(self, pairs: Pairs) -> Array:
@@ -90,14 +87,18 @@ class Evaluator:
         return edges.Medium(self.flow, self.terrain, self.polar, self.integration.kernel(), self.cost.kernel())
 
     @property
+    def exact(self) -> bool:
+        """Whether all legs of a node are found together, under its fan."""
+        return self.steering.connector is None
+
+    @property
     def flies_backward(self) -> bool:
         """Whether one fan, flown back in time, finds all legs to a point."""
-        return isinstance(self.steering, FlowMapMethod) and is_steady(self.flow)
+        return self.exact and is_steady(self.flow)
 
     def by_fan(self) -> "Evaluator":
         """The same, steering by the flow map."""
-        exact = isinstance(self.steering, FlowMapMethod)
-        return self if exact else replace(self, steering=FlowMapMethod())
+        return self if self.exact else replace(self, steering=FlowMapMethod())
 
     def reach(
         self,

@@ -18,7 +18,6 @@ from .evaluator import NODES_AT_ONCE, Evaluator
 from .neighbours import as_csr
 from .pairs import Found, NeighbourLegs, ReachableLegs
 from .problem import Problem
-from .steering import FlowMapMethod
 
 FAN_EVERY = 12
 """Every so many slices a fan looks for all legs again; between, they are followed."""
@@ -88,7 +87,7 @@ class Follower:
 
     def slices(self, source: Index) -> Iterator[Found]:
         """The pairs from the nodes `source` at each departure; each node's depend on nothing but itself."""
-        exact = isinstance(self.problem.evaluator.steering, FlowMapMethod)
+        exact = self.problem.evaluator.exact
         held: Held | None = None
         before = 0.0
         for number, departure in enumerate(self.problem.departures):

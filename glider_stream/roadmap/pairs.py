@@ -9,7 +9,6 @@ from ..base.arrays import Array, Bools, Index
 from ..water.inspect import is_steady
 from .evaluator import Evaluator
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
-from .steering import FlowMapMethod
 
 SAMPLED = 16
 """Nodes whose pairs are counted before any work is cut."""
@@ -135,7 +134,7 @@ class ReachableLegs:
         departs = self.departure if departure is None else departure
         some = wanted if self.limit == 0 else None
         indptr, target, outcomes = self._fan.reach(self.position, departs, source, self.limit, some)
-        if not isinstance(self.evaluator.steering, FlowMapMethod):
+        if not self.evaluator.exact:
             departs = self.departure if departure is None else _by_node(self.position, source, departure)
             outcomes = self.evaluator.connect(self.position, departs, source, indptr, target)
         return Found(indptr, target, outcomes)
@@ -144,7 +143,7 @@ class ReachableLegs:
         """As Legs says; all that are reached."""
         departs = _or(departure, self.departure)
         nodes, outcomes = self._fan.reach_point(self.position, point, departs, False)
-        if not isinstance(self.evaluator.steering, FlowMapMethod):
+        if not self.evaluator.exact:
             return _from_point(self.evaluator, self.position, nodes, point, departs)
         return Attached(nodes, outcomes)
 
@@ -157,7 +156,7 @@ class ReachableLegs:
         if not is_steady(self.evaluator.flow):
             return _each_towards(self.evaluator, self.position, self.before(point), point, self.departure)
         nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, True)
-        if not isinstance(self.evaluator.steering, FlowMapMethod):
+        if not self.evaluator.exact:
             return _each_towards(self.evaluator, self.position, nodes, point, self.departure)
         return Attached(nodes, outcomes)
 

@@ -1,11 +1,18 @@
-"""How legs are looked for: steering methods and the integration, as a scenario has them."""
+"""How legs are looked for: steering methods and the integration, as a scenario has them.
 
+A new method is one class like these and one row of METHODS: nothing else asks which method it has.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..base.checks import LONGEST, WIDEST
 from ..base.settings import require
-from ..kernels import control, motion
+from ..kernels import connect, control, motion, refine
 from ..kernels.fan import FlowMap
+
+Connector = Callable[..., None]
+"""A kernel that tries pairs one by one, as kernels/connect.py has it."""
 
 MAX_CANDIDATES = 1_000_000
 
@@ -19,8 +26,13 @@ class SurfaceMethod:
     candidates: int
 
     def __post_init__(self) -> None:
-        fits = 1 <= self.candidates <= MAX_CANDIDATES
-        require(fits, f"`steering.candidates` must be from 1 to {MAX_CANDIDATES:,}; got {self.candidates}")
+        _check_candidates(self.candidates)
+
+    @property
+    def connector(self) -> Connector:
+        """The kernel that tries pairs one by one."""
+        kernel: Connector = connect.connect_nodes
+        return kernel
 
     def kernel(self) -> control.Steering:
         """As the kernels read it."""
@@ -28,13 +40,23 @@ class SurfaceMethod:
 
 
 @dataclass(frozen=True)
-class StreamlineMethod(SurfaceMethod):
+class StreamlineMethod:
     """The paper's method: controls on the control line.
 
     With `refine`, those that land nearest are first guesses of exact legs, polished as the flow map's are.
     """
 
+    candidates: int
     refine: bool = False
+
+    def __post_init__(self) -> None:
+        _check_candidates(self.candidates)
+
+    @property
+    def connector(self) -> Connector:
+        """The kernel that tries pairs one by one."""
+        kernel: Connector = refine.refine_nodes if self.refine else connect.connect_nodes
+        return kernel
 
     def kernel(self) -> control.Steering:
         """As the kernels read it."""
@@ -58,9 +80,19 @@ class FlowMapMethod:
         fits = 0 <= self.generations <= MAX_GENERATIONS
         require(fits, f"`steering.generations` must be from 0 to {MAX_GENERATIONS}; got {self.generations}")
 
+    @property
+    def connector(self) -> None:
+        """No kernel tries pairs one by one: all legs of a node are found together, under its fan."""
+        return None
+
     def kernel(self) -> FlowMap:
         """As the kernels read it."""
         return FlowMap(*self.fan, self.generations)
+
+
+def _check_candidates(candidates: int) -> None:
+    fits = 1 <= candidates <= MAX_CANDIDATES
+    require(fits, f"`steering.candidates` must be from 1 to {MAX_CANDIDATES:,}; got {candidates}")
 
 
 Method = SurfaceMethod | StreamlineMethod | FlowMapMethod

@@ -65,7 +65,9 @@ class Assembly:
             begins = self.begins(clock)
             rows = self.problem.evaluator.trace(source, edge, begins)
             rows[:, 0] += clock - begins
-            rows[[0, -1], 0] = clock, clock + edge.time  # the sum above rounds; legs follow each other exactly
+            # the sum above rounds: legs follow each other exactly, and no row lies beyond its leg's end
+            rows[:, 0] = np.clip(rows[:, 0], clock, clock + edge.time)
+            rows[[0, -1], 0] = clock, clock + edge.time
             control = edge.glide_angle, edge.heading, edge.speed
             ends, track = self._lonlat(source, target), self._lonlat(*rows[:, 1:])
             north = self._north(source)

@@ -24,7 +24,7 @@ SIDE = 512
 """Cells of the raster along its longer side, at most."""
 FINEST = 25.0
 """The smallest cells [m]; below, legs are looked at every 5 m."""
-MARGIN = 10.0
+WALL = 10.0
 """The raster keeps this far [m] from what it stands for: half a look of a leg, and what a map of a grid errs."""
 MOST_TEXT = 50_000_000
 """The most that a file of polygons may hold [bytes]."""
@@ -83,11 +83,11 @@ class Raster:
         self.land = np.zeros(tuple(self.count), dtype=bool)
 
     def _corners(self) -> tuple[Array, Array]:
-        """The corners of the cells about the points, MARGIN further out on either side: (2 ni, 2 nj)."""
+        """The corners of the cells about the points, WALL further out on either side: (2 ni, 2 nj)."""
         axes = []
         for n in range(2):
             middle = self.low[n] + self.step * np.arange(self.count[n])
-            half = self.step / 2 + MARGIN
+            half = self.step / 2 + WALL
             axes.append(np.stack([middle - half, middle + half], axis=1).ravel())
         x, y = np.meshgrid(*axes, indexing="ij")
         return x, y
@@ -123,7 +123,7 @@ class Raster:
         import shapely
 
         x, y = (self.low[n] + self.step * np.arange(self.count[n]) for n in range(2))
-        reach = self.step * math.sqrt(0.5) + MARGIN
+        reach = self.step * math.sqrt(0.5) + WALL
         for polygon in polygons:
             west, south, east, north = polygon.bounds
             i = np.flatnonzero((x >= west - reach) & (x <= east + reach))

@@ -88,13 +88,13 @@ def test_the_turning_water_is_crossed_in_the_least_time():
 
 def test_nobody_leaves_the_trap(report):
     assert report.references["trap"].seconds is None
-    for method in (*suite.METHODS, *baselines.BASELINES):
+    for method in (*suite.COMPARED, *baselines.BASELINES):
         assert not outcome(report, "trap", method).solved
 
 
 def test_a_report_says_what_it_found(report):
     read = json.loads(json.dumps(report.as_dict(), allow_nan=False))
-    assert len(read["outcomes"]) == 3 * (len(suite.METHODS) + len(baselines.BASELINES))
+    assert len(read["outcomes"]) == 3 * (len(suite.COMPARED) + len(baselines.BASELINES))
     assert read["outcomes"][0]["over_reference"] == pytest.approx(1.0, abs=0.005)
     for name in ("uniform-current", "trap", "jet-crossing"):
         assert report.completeness[name][1] > 0
@@ -117,7 +117,7 @@ def test_the_log_has_what_the_report_has(report):
     lines = suite.ompl_log(report, "uniform-current").splitlines()
     assert lines[0].startswith("glider-stream version ")
     assert lines[1] == "Experiment uniform-current"
-    assert lines.count(".") == len(suite.METHODS) + len(baselines.BASELINES) + 1
+    assert lines.count(".") == len(suite.COMPARED) + len(baselines.BASELINES) + 1
     rows = [line for line in lines if line.endswith("; ")]
     assert len(rows) == len([one for one in report.attempts if one.problem == "uniform-current"])
 

@@ -33,7 +33,14 @@ FLOWS = {
     "nearest": [*GYRE, "neighbours.kind=nearest", "neighbours.k=40"],
     "radius": [*GYRE, "neighbours.kind=radius", "neighbours.radius=420.0"],
     "all": [*GYRE, "neighbours.kind=all"],
-    "streamline": [*GYRE, "steering.method=streamline", "steering.candidates=200", "steering.refine=true"],
+    "streamline": [
+        *GYRE,
+        "neighbours.kind=nearest",
+        "neighbours.k=30",
+        "steering.method=streamline",
+        "steering.candidates=24",
+        "steering.refine=true",
+    ],
 }
 ENERGY = [*GYRE, "cost.kind=energy", "cost.preset=slocum", "cost.hotel=0.9"]
 
@@ -258,7 +265,7 @@ def test_when_to_leave(tmp_path, capsys, monkeypatch):
     rows = strict_json(asked.out)
     assert [row["departure_s"] for row in rows["departures"]] == [0.0, 150.0, 300.0]
     assert rows["best"]["travel_time_s"] == pytest.approx(min(p.travel_time for p in found.paths[:3]), abs=0.05)
-    none = command(capsys, "plan", "swinging-gyre", *sets, "--arrive-by", "60")
+    none = command(capsys, "plan", "swinging-gyre", *sets, "--arrive-by", "60", "--every", "60")
     assert none.code == 1
     assert "none of these arrives in time" in none.err
     for wrong, words in (

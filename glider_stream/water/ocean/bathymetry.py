@@ -33,7 +33,8 @@ HEIGHT_WORDS = re.compile(r"\b(elevation|height|altitude|topography)\b")
 """Long names of what counts upward."""
 LIMIT = 500_000_000
 """The most that the heights of a domain may take in memory [bytes]."""
-MARGIN = 3
+CHART_BEYOND = 3
+"""Cells of a chart kept around a domain."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ def _read(name: str, data: Any, frame: LocalFrame, lon: Range, lat: Range, beyon
             f"`{one.name}` in {name} is in {units!r}, not in metres: convert it, or name `units` in `names`"
         )
     cell = min(float(size.min()) for size in grid.cell_sizes())
-    cut = grid.cut(name, lon, lat, frame.lon, MARGIN + math.ceil(max(beyond, 0.0) / max(cell, 1.0)))
+    cut = grid.cut(name, lon, lat, frame.lon, CHART_BEYOND + math.ceil(max(beyond, 0.0) / max(cell, 1.0)))
     size = 8 * cut.grid.shape[0] * cut.grid.shape[1]
     require(size <= LIMIT, f"the bottom of {name} would take {size / 1e9:.1f} GB: narrow the domain")
     picked = {dims[0]: rows[cut.rows], dims[1]: columns[cut.columns], **single}

@@ -18,7 +18,7 @@ from .axes import degrees, places
 from .clock import Clock, clock_of
 from .doubts import doubts_of, speed_doubts
 from .file import Times
-from .flow import HALO, MARGIN, levels_for
+from .flow import HALO, READ_BEYOND, levels_for
 from .grid import Grid, grid_of
 from .ground import model_depth, places_of
 from .horizontal import halves, horizontal_of, no_axis, signs_of
@@ -68,7 +68,7 @@ class Points:
         if domain is None:
             return self
         middle = float(wrapped((domain[0][0] + (domain[0][1] - domain[0][0]) % 360 / 2), 0.0))
-        cut = self.grid.cut(name, domain[0], domain[1], middle, MARGIN + HALO + 1)
+        cut = self.grid.cut(name, domain[0], domain[1], middle, READ_BEYOND + HALO + 1)
         placeless = None if self.placeless is None else self.placeless[cut.rows][:, cut.columns]
         return replace(
             self, grid=cut.grid, rows=self.rows[cut.rows], columns=self.columns[cut.columns], placeless=placeless

@@ -18,7 +18,7 @@ from .file import OceanFile, Times, parse_time
 from .grid import EVEN, Grid, IndexMap, gaps, index_map, span, unbroken
 from .levels import no_such_levels
 
-MARGIN = 2
+READ_BEYOND = 2
 """Cells kept around a domain: paths may stray."""
 HALO = 2
 """Further cells that fill the dry ones of the margin: a value does not depend on where the domain ends."""
@@ -178,10 +178,10 @@ def _build(
     lat: Range,
     depth: Range,
     epoch: str | np.datetime64 | None,
-    margin: int = MARGIN,
+    margin: int = READ_BEYOND,
 ) -> tuple[OceanGrid, Seabed, Grid]:
     during, seconds = _seconds(file, epoch)
-    cut = file.grid.cut(file.name, lon, lat, frame.lon, MARGIN + HALO)
+    cut = file.grid.cut(file.name, lon, lat, frame.lon, READ_BEYOND + HALO)
     levels = levels_for(file.name, None if file.surface else file.depth, depth, file.top)
     depths = file.depth[levels]
     lons, lats = (part.T for part in cut.grid.mesh())
