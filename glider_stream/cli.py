@@ -139,6 +139,9 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 ROUTE_OPTIONS = (
     click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic."),
     click.option("--goal", type=place, metavar="X,Y,Z", help="As --start."),
+    click.option(
+        "--depart", metavar="T", help="Leave then: seconds of the flow, or a time (UTC); not query.departure."
+    ),
     click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write."),
     click.option(
         "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
@@ -210,6 +213,7 @@ def _answer(
     *,
     start: Any,
     goal: Any,
+    depart: str | None,
     outputs: tuple[Path, ...],
     most_energy: float | None,
     most_yos: int | None,
@@ -248,10 +252,12 @@ def _answer(
             "--depart-between and --arrive-by go with none of --output, --most-energy, --polish, --thin, "
             "--card, --window-hours, --waypoints and --arrival-radius; set query.departure to what they find"
         )
+    if departures and depart is not None:
+        raise click.UsageError("--depart goes with neither --depart-between nor --arrive-by; leave it out")
     if not departures and (every is not None or figure is not None):
         raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
     if front:
-        corners = opened().trade_off(start, goal, surfacing=rule)
+        corners = opened().trade_off(start, goal, depart=depart, surfacing=rule)
         answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     elif departures:
         ends: dict[str, Any] = {"start": start, "goal": goal, "surfacing": rule}
@@ -264,6 +270,7 @@ def _answer(
         path = source.query(
             start,
             goal,
+            depart=depart,
             outputs=outputs,
             most_energy=most_energy,
             polish=polish,
@@ -389,15 +396,23 @@ def describe(
 @ELSEWHERE
 @click.argument("route", nargs=-1, required=True, type=FILE)
 @click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
+@click.option("--depart", metavar="T", help="When it leaves, as for `query`.")
 @JSON
-def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], start: Any, as_json: bool) -> None:
+def score(
+    roadmap: Path,
+    overrides: tuple[str, ...],
+    route: tuple[Path, ...],
+    start: Any,
+    depart: str | None,
+    as_json: bool,
+) -> None:
     """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails.
 
     CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
     """
     from .opened import open_either
 
-    found = open_either(roadmap, overrides).score(route, start)
+    found = open_either(roadmap, overrides).score(route, start, depart=depart)
     if as_json:
         _write_json(found.as_dict())
     else:

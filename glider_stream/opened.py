@@ -32,6 +32,7 @@ from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .search.why_not import no_edges
 from .water.domain import GeographicDomain, Point
+from .water.inspect import is_steady
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,6 +81,24 @@ class OpenedScenario:
         rule = self._surfacing if surfacing is None else surfacing
         return self._once(rule, RoutePlanner, lambda: planner_of(self.problem, self._roadmap, rule))  # type: ignore[type-abstract]
 
+    def _leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
+        """`planner` for routes that leave at a time, the scenario's departure if None."""
+        problem, road = self.problem, self._roadmap
+        since = 0.0 if depart is None else seconds(depart, problem, "depart") - problem.departure
+        changes = not is_steady(problem.evaluator.flow)
+        if since == 0.0 or (changes and not problem.frozen):
+            planner = self.planner(surfacing)
+            return planner.leaving(since) if since else planner
+        fits = not (changes and isinstance(road, Roadmap))
+        legs = f"frozen paths over this roadmap leave at {problem.departure:g} s"
+        require(fits, f"{legs}; got {depart}; leave `query.frozen` out, or build it with that `query.departure`")
+        return planner_of(problem.leaving(since), road, self._surfacing if surfacing is None else surfacing)
+
+    def _problem_of(self, route: Path) -> Problem:
+        """The problem at the time at which a route leaves, where it says that."""
+        problem = self.problem
+        return problem if route.departure is None else problem.leaving(route.departure - problem.departure)
+
     @property
     def _roadmap(self) -> Roadmap | SlicedRoadmap | None:
         return None
@@ -100,6 +119,7 @@ class OpenedScenario:
         start: Point | None = None,
         goal: Point | None = None,
         *,
+        depart: Moment | None = None,
         outputs: Sequence[str | File] = (),
         most_energy: float | None = None,
         polish: bool = False,
@@ -111,6 +131,7 @@ class OpenedScenario:
     ) -> Path:
         """The cheapest path between two points, written to each of `outputs`.
 
+        It leaves at `depart`, seconds of the flow or an ISO 8601 text (UTC); at the scenario's departure if None.
         `most_energy` [J] asks for the fastest of the paths of `trade_off` that uses no more. `polish` moves the
         stops off the nodes, cuts legs and counts yos anew, as long as the cost falls. `thin` [m] joins legs whose
         stops lie so near the straight line, where one glide does, and none where that breaks another rule.
@@ -125,7 +146,7 @@ class OpenedScenario:
         """
         for output in outputs:
             check_export(output)
-        planner, ends = self.planner(surfacing), self._ends(start, goal)
+        planner, ends = self._leaving(depart, surfacing), self._ends(start, goal)
         path = best_path(planner, ends, most_energy=most_energy, polish=polish, thinned=thin)
         check_legs(path, outputs)
         notes: list[str] = []
@@ -138,27 +159,36 @@ class OpenedScenario:
             export_path(path, output, notes.append, **written)
         return replace(path, notes=(*path.notes, *notes))
 
-    def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
+    def table(self, starts: Sequence[Point], goals: Sequence[Point], *, depart: Moment | None = None) -> Array:
         """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none.
+
+        They leave at `depart`, as in `query`.
 
         Examples:
             >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
             array([[430., 382.]])
         """
-        free = self.planner(Surfacing())
+        free = self._leaving(depart, Surfacing())
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
-    def arrivals(self, start: Point | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot.
+    def arrivals(self, start: Point | None = None, *, depart: Moment | None = None) -> Array:
+        """When each node (n,) can be reached from a point at the soonest [s from departure]; inf where not.
+
+        Gliders leave at `depart`, as in `query`.
 
         Examples:
             >>> int((road.arrivals() < 300).sum())
             18
         """
-        return self.planner(Surfacing()).arrivals(None if start is None else self._point(start))
+        return self._leaving(depart, Surfacing()).arrivals(None if start is None else self._point(start))
 
     def trade_off(
-        self, start: Point | None = None, goal: Point | None = None, *, surfacing: Surfacing | None = None
+        self,
+        start: Point | None = None,
+        goal: Point | None = None,
+        *,
+        depart: Moment | None = None,
+        surfacing: Surfacing | None = None,
     ) -> TradeOff:
         """Every path of one query that no other beats both in time and in energy; all else as in `query`.
 
@@ -167,7 +197,7 @@ class OpenedScenario:
             >>> [len(path.legs) for path in glider_stream.open(energy).trade_off().paths]
             [4]
         """
-        return front(self.planner(surfacing), self._ends(start, goal))
+        return front(self._leaving(depart, surfacing), self._ends(start, goal))
 
     def card(self, path: Path) -> Card:
         """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
@@ -177,12 +207,19 @@ class OpenedScenario:
             leg   hours  over ground ...
             ...
         """
-        return card_of(path, self.problem)
+        return card_of(path, self._problem_of(path))
 
-    def score(self, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
+    def score(
+        self,
+        route: str | File | Sequence[str | File],
+        start: Point | None = None,
+        *,
+        depart: Moment | None = None,
+    ) -> Score:
         """Fly a drawn route (CSV, GeoJSON, KML, GPX, a path file, goto lists, targets) in the roadmap's water.
 
-        Several files are one route, one after another. `start` is where the vehicle is, before its first point.
+        Several files are one route, one after another. `start` is where the vehicle is, before its first point;
+        it leaves at `depart`, as in `query`.
 
         Examples:
             >>> _ = road.query(outputs=["path.json"])
@@ -192,7 +229,7 @@ class OpenedScenario:
         files = [route] if isinstance(route, str | File) else list(route)
         drawn = [read_drawn(file) for file in files]
         # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
-        planner, domain = self.planner(Surfacing()), self.scenario.domain
+        planner, domain = self._leaving(depart, Surfacing()), self.scenario.domain
         on_globe = isinstance(domain, GeographicDomain)
         cure = "and the roadmap is in metres; give x, y, z in a CSV file"
         points = [] if start is None else [self._point(start)]
@@ -282,13 +319,19 @@ class OpenedScenario:
         if route is None:
             cure = "draw a route over it, or build its roadmap"
             require(self._roadmap is not None, f"a scenario has no roadmap to draw; {cure}")
-            road = self._roadmap
+            road, problem, title = self._roadmap, self.problem, self.title
             assert road is not None
-            if isinstance(road, SlicedRoadmap):  # the slice that the departure asks for
-                road = road.at(int(np.abs(road.departures - self.problem.departure).argmin()))
-            return draw_roadmap(road, self.problem, output, depths, self.title)
-        how = output, depths, chart, fronts, free.arrivals
-        return draw_route(self.position, self.problem, route, *how, self.title)
+            if isinstance(
+                road, SlicedRoadmap
+            ):  # the slice nearest to the departure, over the current of its time
+                number = int(np.abs(road.departures - problem.departure).argmin())
+                problem = problem.leaving(float(road.departures[number]) - problem.departure)
+                which = f"slice {number + 1} of {road.departures.size}"
+                road, title = road.at(number), f"{title}, {which}" if title else which.capitalize()
+            return draw_roadmap(road, problem, output, depths, title)
+        problem = self._problem_of(route)
+        arrivals = self._leaving(problem.departure, Surfacing()).arrivals if fronts is not None else free.arrivals
+        return draw_route(self.position, problem, route, output, depths, chart, fronts, arrivals, self.title)
 
     def plot_routes(
         self,
@@ -314,7 +357,9 @@ class OpenedScenario:
         named = f"each path needs a name of its own; got {', '.join(map(str, paths))}; rename a file"
         require(len(routes) == len(paths), named)
         self.planner(Surfacing())  # which compares the water with the roadmap's
-        return draw_routes(self.position, self.problem, routes, output, depth)
+        leave = {route.departure for route in routes.values()}
+        problem = self._problem_of(next(iter(routes.values()))) if len(leave) == 1 else self.problem
+        return draw_routes(self.position, problem, routes, output, depth)
 
 
 class OpenedRoadmap(OpenedScenario):

@@ -26,6 +26,7 @@ from .roadmap.roadmap import Roadmap
 from .roadmap.slices import SlicedRoadmap
 from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario
+from .search.departures import Moment
 from .search.path import Path
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
@@ -198,6 +199,7 @@ def query(
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
     polish: bool = False,
+    depart: Moment | None = None,
 ) -> Path:
     """The cheapest path between two points, see `OpenedRoadmap.query`.
 
@@ -213,6 +215,7 @@ def query(
     return open_roadmap(roadmap).query(
         start,
         goal,
+        depart=depart,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
@@ -236,6 +239,7 @@ def plan(
     *,
     overrides: Sequence[str] = (),
     polish: bool = False,
+    depart: Moment | None = None,
 ) -> Path:
     """The cheapest path of a scenario without a roadmap; all else as in `query`.
 
@@ -249,6 +253,7 @@ def plan(
     return open_scenario(scenario, overrides).query(
         start,
         goal,
+        depart=depart,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,

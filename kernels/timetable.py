@@ -76,30 +76,33 @@ def _sink(heap, place, key, size):
 
 @entry_point(nogil=True)
 def earliest_arrivals(
-    departures, indptr, target, time, learnt_first, learnt_target, learnt, learnt_time, goal, arrival, before
-):
-    """Dijkstra's algorithm with the clock running: from the nodes whose `arrival` (nodes,) [s] is finite.
+    departures, indptr, target, time, learnt_first, learnt_target, learnt, learnt_time, goal, least, latest,
+    arrival, before,
+):  # fmt: skip
+    """A* with the clock running: from the nodes whose `arrival` (nodes,) [s] is finite.
 
     Legs of node n at departures[k] (slices,) [s] are `target`, `time` [indptr[s]:indptr[s + 1]], for the row
     s = n slices + k, targets rising; linear between. What was learnt of the legs of each node, from
-    `learnt_first` (nodes + 1,) on by target and departure, goes before. Fills `arrival` and `before`, the node of
-    each last leg; ends at the node `goal`, at none where it is -1. Exact where who leaves earlier does not arrive
-    later.
+    `learnt_first` (nodes + 1,) on by target and departure, goes before. `least` (nodes,) [s] is what remains to
+    the goal at the least, never less after a leg by more than the leg takes; nodes from which it cannot be
+    reached by `latest` [s] are left out. Fills `arrival` and `before`, the node of each last leg; ends at
+    the node `goal`, at none where it is -1. Exact where who leaves earlier does not arrive later.
     """
     nodes, slices = arrival.size, departures.size
     heap, place = np.empty(nodes, np.int64), np.full(nodes, -1, np.int64)
+    key = arrival + least
     size = 0
     for n in range(nodes):
-        if arrival[n] < math.inf:
+        if key[n] < math.inf:
             heap[size] = n
-            _rise(heap, place, arrival, size)
+            _rise(heap, place, key, size)
             size += 1
     while size > 0:
         node = heap[0]
         size -= 1
         if size > 0:
             heap[0] = heap[size]
-            _sink(heap, place, arrival, size)
+            _sink(heap, place, key, size)
         place[node] = -2
         if node == goal:
             break
@@ -127,9 +130,10 @@ def earliest_arrivals(
             while end < last and learnt_target[end] == to:
                 end += 1
             takes = corrected(when_there, early, time_early, late, time_late, learnt, learnt_time, first, end)
-            if when + takes < arrival[to]:
+            if when + takes < arrival[to] and when + takes + least[to] <= latest:
                 arrival[to], before[to] = when + takes, node
+                key[to] = when + takes + least[to]
                 if place[to] < 0:
                     heap[size], place[to] = to, size
                     size += 1
-                _rise(heap, place, arrival, place[to])
+                _rise(heap, place, key, place[to])

@@ -1,9 +1,10 @@
 """Jobs: builds that survive their process, in parts, on what an older roadmap holds, and on a cluster."""
 
 import heapq
+import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -125,17 +126,11 @@ def _run(
     slices = len(problem.departures)
     nodes = np.arange(*shard.nodes(len(position)))
     tally, sample = Tally(len(nodes) * slices, used), StepSample(len(position))
-    # legs of one departure tell how fine the steps are
-    one, of_one = replace(problem, slices=()), slices == 1
-    if old.source.size:
-        tally.add(old)
-        if of_one:
-            sample.take(old)
-    for edges in journal.records():
+    for edges in itertools.chain([old] if old.source.size else [], journal.records()):
         tally.add(edges)
-        if of_one:
+        if slices == 1:
             sample.take(edges)
-    made = sample.checked(made, one, position, lambda some: job.finder(one, position, some, batch_pairs))
+    made = sample.checked(made, problem, position, lambda one, some: job.finder(one, position, some, batch_pairs))
     known = journal.done.copy()
     twice = known[old.source].any()
     require(not twice, f"{journal.path} holds nodes that --from has right; begin anew with --restart")

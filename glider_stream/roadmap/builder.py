@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
 from ..base.settings import require
+from ..base.threads import thread_count as threads_now
 from ..base.threads import threads
 from ..kernels.edges import STATUS, TIME, Status
+from .evaluator import NODES_AT_ONCE
 from .follow import Follower
 from .pairs import Found, Legs
 from .problem import Problem
@@ -22,6 +24,8 @@ from .slices import SlicedRoadmap, rows_of
 from .step_error import StepSample
 
 BATCH_PAIRS = 100_000
+SPANS = 2
+"""Shares of a batch for each thread, so that none waits long for the slowest."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +80,17 @@ def find_edges(
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     legs = problem.legs(position)
     source = np.arange(len(position)) if source is None else source
-    slices = len(problem.departures)
-    size = max(1, batch_pairs // legs.pairs_per_node // slices)
-    follower = Follower.of(problem, position) if slices > 1 else None
+    size = nodes_of_batch(problem, legs, batch_pairs)
+    follower = Follower.of(problem, position) if len(problem.departures) > 1 else None
     for first in range(0, len(source), size):
         some = source[first : first + size]
         yield _evaluated(legs, some) if follower is None else _followed(follower, some)
+
+
+def nodes_of_batch(problem: Problem, legs: Legs, batch_pairs: int) -> int:
+    """How many nodes have some `batch_pairs`; of many departures no fewer than keep all threads busy."""
+    nodes, slices = max(1, batch_pairs // legs.pairs_per_node), len(problem.departures)
+    return max(nodes // slices, min(nodes, SPANS * NODES_AT_ONCE * threads_now()))
 
 
 def _evaluated(legs: Legs, source: Index) -> Edges:
@@ -161,12 +170,11 @@ def build_slices(
     parts: list[Edges] = []
     with threads(thread_count) as used:
         warm_up(problem)
-        one = replace(problem, slices=())
         made = StepSample(len(position)).checked(
             provenance_of(problem, position),
-            one,
+            problem,
             position,
-            lambda nodes: find_edges(one, position, nodes, batch_pairs),
+            lambda one, nodes: find_edges(one, position, nodes, batch_pairs),
         )
         tally = Tally(len(position) * len(problem.departures), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):

@@ -1,8 +1,8 @@
 """The problem: a scenario made into objects."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -54,6 +54,11 @@ class Problem:
     def departures(self) -> tuple[float, ...]:
         """Of all slices of the roadmap [s]: its one departure where the scenario has no [departures]."""
         return self.slices or (self.departure,)
+
+    def leaving(self, since: float) -> "Problem":
+        """The same problem for gliders that leave `since` [s] later."""
+        departs = None if self.departs is None else self.departs + timedelta(seconds=since)
+        return replace(self, departure=self.departure + since, departs=departs)
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""

@@ -25,6 +25,8 @@ from .thin import thin
 from .time_dependent import ClockPlanner
 from .trade_off import TradeOff
 
+SAME = 1e-6
+"""Departures [s] that lie no further apart are one: sums of times round."""
 Ends = tuple[Array | None, Array | None]
 """Start and goal (3,) [m]; None for the scenario's own."""
 
@@ -49,7 +51,7 @@ def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: 
 
 def _slice_of(roadmap: SlicedRoadmap, departure: float) -> Roadmap:
     """The slice of a departure [s]; InputError where there is none."""
-    number = np.flatnonzero(roadmap.departures == departure)
+    number = np.flatnonzero(np.abs(roadmap.departures - departure) < SAME)
     times = ", ".join(f"{time:g}" for time in roadmap.departures[:20])
     what = (
         f"frozen paths take every leg as at `query.departure` = {departure:g} s, which is no slice of the roadmap"
@@ -79,8 +81,10 @@ def best_path(
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
         _check_energy(planner)
         path = planner.within(*ends, most_energy)
+    notes = path.notes
     path = polished(path, planner) if polish else path
-    return path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
+    path = path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
+    return replace(path, notes=notes)
 
 
 def front(planner: RoutePlanner, ends: Ends) -> TradeOff:

@@ -33,7 +33,7 @@ class SlicePlanner(ClockPlanner):
 
     def leaving(self, since: float) -> "SlicePlanner":
         """The same planner for routes that leave `since` [s] later."""
-        later = SlicePlanner(super().leaving(since).problem, self.slices, self.rule)
+        later = SlicePlanner(self.problem.leaving(since), self.slices, self.rule)
         later._speeds = self._speeds
         return later
 
@@ -45,14 +45,25 @@ class SlicePlanner(ClockPlanner):
             and problem.bins is None
             and problem.evaluator.cost.unit == "s"
             and aim == Aim(by_cost=True)
-            and first <= problem.departure <= last
         )
         if not by_slices:
             return super()._query(start, goal, aim)
+        if not first <= problem.departure <= last:
+            return self._without(start, goal, aim, f"this route leaves at {problem.departure:g} s")
         ends = self._ends(start, [goal])
         if np.array_equal(ends.start, ends.goals[0]):
             return self.assembly.path(ends.start, ends.goals[0], [])
         hops, agreement = self.slices.fastest(ends.start, ends.goals[0], problem.departure)
-        if hops is None or problem.departure + sum(edge.time for _, _, edge in hops[:-1]) > last:
+        if hops is None:
             return super()._query(start, goal, aim)
+        if problem.departure + sum(edge.time for _, _, edge in hops[:-1]) > last:
+            return self._without(start, goal, aim, "some legs of this route leave later")
+        self._check_steps(hops)
         return replace(self.assembly.path(ends.start, ends.goals[0], hops), notes=(str(agreement),))
+
+    def _without(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim, why: str) -> Path:
+        """The path by legs that are found when they are needed, with a note of why slices cannot answer."""
+        first, last = self.slices.roadmap.departures[[0, -1]]
+        slices = f"the roadmap's slices are from {first:g} s to {last:g} s"
+        note = f"{slices}, and {why}: its legs were found without them"
+        return replace(super()._query(start, goal, aim), notes=(note,))

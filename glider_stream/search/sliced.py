@@ -24,6 +24,8 @@ from .path import Hop
 AGREES = 0.01
 """Search and flight agree to so much [s]."""
 MOST_ROUNDS = 100
+BESIDE = 0.02
+"""What a leg gains by ending a little beside its target, as a share of it, at the most."""
 LAST_LEGS_AT_ONCE = 32
 """Nodes from which a leg to a goal that is no node is looked for together."""
 
@@ -102,9 +104,9 @@ class SliceSearch:
         rounds, agreed = 0, False
         while rounds < MOST_ROUNDS and not agreed:
             rounds += 1
-            found = one.search()
-            agreed = found is None or found.arrives >= arrives - AGREES
-            if found is None or agreed:
+            found = one.search(arrives - AGREES)
+            agreed = found is None
+            if found is None:
                 break
             hops, when = one.flown(found)
             if hops is not None and when < arrives:
@@ -124,7 +126,9 @@ class _Query:
         position = self.roadmap.position
         self.starts, self.goals = (np.flatnonzero((position == end).all(axis=1)) for end in (start, goal))
         self.legs = self.problem.legs(position)
-        self.away = None if self.starts.size else _arriving(self.legs.away(start))
+        self.ends = self.problem.evaluator.flow.extent.t_hi
+        self.away = None if self.starts.size else _arriving(self.legs.away(start), self.ends - departure)
+        self.least = self._least(position)
         self._last: dict[tuple[int, float], Array] = {}
 
     def direct(self) -> list[Hop] | None:
@@ -134,8 +138,8 @@ class _Query:
         row = self._exact(self.start, self.goal, self.departure)
         return [(self.start, self.goal, edge_of(row))] if row[STATUS] == CONNECTED else None
 
-    def search(self) -> _Found | None:
-        """The fastest way, by the slices and what was learnt; None where there is none."""
+    def search(self, latest: float) -> _Found | None:
+        """The fastest way that arrives by `latest` [s], by the slices and what was learnt; None if none does."""
         road = self.roadmap
         nodes = len(road.position)
         arrival, before = np.full(nodes, math.inf), np.full(nodes, -1, np.int64)
@@ -145,13 +149,14 @@ class _Query:
             arrival[self.away.nodes] = self.departure + self.away.outcomes[:, TIME]
         goal = int(self.goals[0]) if self.goals.size else -1
         what = road.departures, road.indptr, road.target, road.time, *self.learnt.table(nodes)
-        earliest_arrivals(*what, goal, arrival, before)
+        latest = min(latest, self.ends)
+        earliest_arrivals(*what, goal, self.least, latest, arrival, before)
         node, arrives, last = goal, math.inf, None
         if goal >= 0:
             arrives = float(arrival[goal])
         else:
-            node, arrives, last = self._through(arrival)
-        if not math.isfinite(arrives):
+            node, arrives, last = self._through(arrival, latest)
+        if not math.isfinite(arrives) or arrives > latest:
             return None
         way = [node]
         while before[way[-1]] >= 0:
@@ -211,7 +216,7 @@ class _Query:
         """The leg between two points that leaves at a time [s], a row of `Edge`; none outlasts the flow."""
         evaluator = self.problem.evaluator
         row: Array = evaluator.connect(np.array([start, goal]), when, [0], [0, 1], [1])[0]
-        if row[STATUS] == CONNECTED and when + row[TIME] > evaluator.flow.extent.t_hi:
+        if row[STATUS] == CONNECTED and when + row[TIME] > self.ends:
             row[STATUS] = math.nan
         return row
 
@@ -221,8 +226,8 @@ class _Query:
             self._last[key] = self._exact(self.roadmap.position[node], self.goal, when)
         return self._last[key]
 
-    def _through(self, arrival: Array) -> tuple[int, float, Array | None]:
-        """The node by which a goal that is none is reached first, when [s], and the leg from there.
+    def _through(self, arrival: Array, latest: float) -> tuple[int, float, Array | None]:
+        """The node by which a goal that is none is reached first, by `latest`, when [s], and the leg from there.
 
         Nodes are looked at by the soonest time at which they could arrive, until none can be sooner.
         """
@@ -230,11 +235,11 @@ class _Query:
         nodes = np.flatnonzero(np.isfinite(arrival) & (position[:, 2] != self.goal[2]))
         if isinstance(self.legs, NeighbourLegs):
             nodes = np.intersect1d(nodes, self.legs.neighbourhood.of(self.goal))
-        soonest = arrival[nodes] + self._least(position[nodes])
+        soonest = arrival[nodes] + self.least[nodes]
         order = np.argsort(soonest, kind="stable")
         best, arrives, leg = -1, math.inf, None
         for first in range(0, order.size, LAST_LEGS_AT_ONCE):
-            if soonest[order[first]] >= arrives:
+            if soonest[order[first]] >= min(arrives, latest):
                 break
             some = nodes[order[first : first + LAST_LEGS_AT_ONCE]]
             for node, row in zip(some, self._last_legs(some, arrival[some]), strict=True):
@@ -253,23 +258,26 @@ class _Query:
             rows = self.problem.evaluator.connect(
                 points, departs, np.arange(count), np.arange(count + 1), np.full(count, count)
             )
-            ends = self.problem.evaluator.flow.extent.t_hi
             for n, row in zip(new, rows, strict=True):
-                if row[STATUS] == CONNECTED and times[int(n)] + row[TIME] > ends:
+                if row[STATUS] == CONNECTED and times[int(n)] + row[TIME] > self.ends:
                     row[STATUS] = math.nan
                 self._last[int(n), times[int(n)]] = row
         return [self._last[int(n), float(at)] for n, at in zip(nodes, when, strict=True)]
 
     def _least(self, points: Array) -> Array:
-        """A bound below the time [s] of a leg from each point (n, 3) [m] to the goal."""
+        """A bound below what remains [s] from each point (n, 3) [m] to the goal, however many legs it takes."""
         evaluator = self.problem.evaluator
+        if not evaluator.exact:  # each leg may end beside its target by as much as the tolerance
+            return np.zeros(len(points))
         polar, flow = evaluator.polar, evaluator.flow
         sink = max(float(vertical_speed(polar, way, polar.steepest[way])) for way in (DIVE, CLIMB))
-        away = np.hypot(*(points[:, :2] - self.goal[:2]).T) - evaluator.integration.tolerance
+        away = np.hypot(*(points[:, :2] - self.goal[:2]).T)
         across = away / (float(polar.best_horizontal.max()) + flow.extent.max_speed)
-        return np.asarray(np.maximum(across, np.abs(points[:, 2] - self.goal[2]) / sink))
+        least = np.maximum(across, np.abs(points[:, 2] - self.goal[2]) / sink)
+        return np.asarray(np.ascontiguousarray((1.0 - BESIDE) * least))
 
 
-def _arriving(attached: Attached) -> Attached:
-    kept = attached.outcomes[:, STATUS] == CONNECTED
+def _arriving(attached: Attached, most: float) -> Attached:
+    """Those that are connected, by legs of no more than `most` [s]."""
+    kept = (attached.outcomes[:, STATUS] == CONNECTED) & (attached.outcomes[:, TIME] <= most)
     return Attached(attached.nodes[kept], attached.outcomes[kept])

@@ -9,6 +9,7 @@ import pytest
 from glider_stream.kernels.timetable import corrected, earliest_arrivals, time_between
 
 NOBODY = np.empty(0, np.int64)
+NO_BOUND = np.zeros(30)
 
 
 def table(seed, nodes=30, slices=4):
@@ -65,7 +66,7 @@ def test_arrivals_are_those_of_labels(seed, when):
     arrival, before = np.full(30, np.inf), np.full(30, -1)
     arrival[4] = when
     nothing = np.zeros(31, np.int64), NOBODY, np.empty(0), np.empty(0)
-    earliest_arrivals(*legs, *nothing, -1, arrival, before)
+    earliest_arrivals(*legs, *nothing, -1, NO_BOUND, math.inf, arrival, before)
     assert arrival == pytest.approx(by_labels(legs, 4, when))
     for node in np.flatnonzero(before >= 0):
         left = arrival[before[node]]
@@ -73,8 +74,25 @@ def test_arrivals_are_those_of_labels(seed, when):
     to_one = np.full(30, np.inf)
     to_one[4] = when
     goal = int(np.flatnonzero(before == 4)[0])
-    earliest_arrivals(*legs, *nothing, goal, to_one, before)
+    earliest_arrivals(*legs, *nothing, goal, NO_BOUND, math.inf, to_one, before)
     assert to_one[goal] == arrival[goal]
+
+
+def test_a_bound_and_a_deadline_change_no_arrival():
+    legs = table(5)
+    nothing = np.zeros(31, np.int64), NOBODY, np.empty(0), np.empty(0)
+    free = np.full(30, np.inf)
+    free[4] = 0.0
+    earliest_arrivals(*legs, *nothing, -1, NO_BOUND, math.inf, free, np.full(30, -1))
+    goal = int(np.argsort(free)[15])
+    # every leg takes 10 s at the least
+    least = np.where(np.arange(30) == goal, 0.0, 9.9)
+    for latest, arrives in ((math.inf, free[goal]), (free[goal], free[goal]), (free[goal] - 0.1, math.inf)):
+        bound, before = np.full(30, np.inf), np.full(30, -1)
+        bound[4] = 0.0
+        earliest_arrivals(*legs, *nothing, goal, least, latest, bound, before)
+        assert bound[goal] == arrives
+        assert (bound[np.isfinite(bound)] >= free[np.isfinite(bound)]).all()
 
 
 def test_what_was_learnt_goes_before_the_slices():
@@ -84,7 +102,7 @@ def test_what_was_learnt_goes_before_the_slices():
     to = int(target[indptr[1]])
     learnt = np.ones(31, np.int64), np.array([to]), departures[[1]].copy(), np.array([1.5])
     learnt[0][0] = 0
-    earliest_arrivals(departures, indptr, target, time, *learnt, -1, arrival, before)
+    earliest_arrivals(departures, indptr, target, time, *learnt, -1, NO_BOUND, math.inf, arrival, before)
     assert arrival[to] == departures[1] + 1.5
     assert before[to] == 0
 
