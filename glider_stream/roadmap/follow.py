@@ -25,8 +25,9 @@ FEW = 48
 """A node that has fewer legs gets a fan each time: their targets lie so far apart that none leads to the next."""
 BESIDE, ABOVE = 8, 1
 """Nodes near each, to which its legs lead on: on its depth, and on the next depth above and below."""
-ROOM = 1.25
-"""Room for a node's legs, in those that it had at the departure before."""
+ROOM = 2.0
+"""Room for a node's legs, in those that it had at the departure before; where it is too small, all are followed
+once more. A third more pairs are looked at than hold."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Roadmaps of several departures: their slices, and the file that holds them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -11,11 +12,12 @@ from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
 from glider_stream.kernels.edges import CONNECTED, STATUS, TIME
 from glider_stream.kernels.follow import COARSE_TOLERANCE, LANDING_TOLERANCE
-from glider_stream.roadmap.builder import build_roadmap, find_edges, node_positions
+from glider_stream.roadmap.builder import build_roadmap, find_edges, node_positions, nodes_of_batch
 from glider_stream.roadmap.compare import difference
 from glider_stream.roadmap.follow import FEW, Follower, nodes_near
 from glider_stream.roadmap.roadmap import EDGE_FIELDS, in_order
 from glider_stream.roadmap.slices import SlicedRoadmap
+from glider_stream.roadmap.step_error import StepSample
 from glider_stream.roadmap.store import read_any_roadmap, read_roadmap, write_roadmap
 from glider_stream.roadmap.verify import check_slices, replayed_misses
 from glider_stream.scenario import read_scenario
@@ -241,12 +243,67 @@ def test_verification_looks_at_every_slice():
             "`query.departure` = 0 s lies outside",
         ),
         (["departures.first=0", "departures.last=10"], "every"),
+        (["departures.first=0", "departures.last=10", "departures.every=-3"], "must be above 0 s; got -3"),
+        (["departures.first=0", "departures.last=10", "departures.every=nan"], "`departures.every` must be"),
+        (["departures.first=inf", "departures.last=10", "departures.every=1"], "`departures.first` must be"),
+        (["departures.first=0", "departures.last=1e30", "departures.every=1"], "`departures.last` must be"),
+        (["departures.first='a'", "departures.last=10", "departures.every=1"], "`departures.first` must be"),
+        (["departures.last=10", "departures.every=1"], "first"),
+        ([*DEPARTURES[2:], "departures.count=4"], "count"),
         ([*DEPARTURES[2:], "flow.epsilon=0.0"], "this one does not; remove that section"),
     ],
 )
 def test_departures_that_make_no_sense_are_refused(given, says):
     with pytest.raises(InputError, match=says):
         read_scenario("swinging-gyre", given).problem()
+
+
+def test_slices_lie_within_the_times_of_the_currents(monkeypatch):
+    scenario = read_scenario("swinging-gyre", DEPARTURES)
+    waters = scenario._waters
+
+    def ending(*reach):
+        flow, terrain, text = waters(*reach)
+        return flow._replace(extent=flow.extent._replace(t_lo=-1.0, t_hi=1799.0)), terrain, text
+
+    monkeypatch.setattr(type(scenario), "_waters", lambda self, *reach: ending(*reach))
+    with pytest.raises(
+        InputError, match=r"`departures\.last` = 1800 s lies outside the times of the flow, -1 to 1799"
+    ):
+        scenario.problem()
+
+
+def test_steps_are_looked_at_over_all_the_departures():
+    """A flow may be gentle at first: the first, the last and a departure between are sampled."""
+    asked = []
+
+    def find(one, nodes):
+        asked.append((one.departure, one.slices))
+        yield from find_edges(one, sliced().position, nodes)
+
+    made = StepSample(len(sliced().position)).checked(sliced().provenance, problem(), sliced().position, find)
+    assert asked == [(0.0, ()), (1200.0, ()), (1800.0, ())]
+    assert made.steps == sliced().provenance.steps
+
+
+def test_the_reader_of_version_1_in_the_documents_refuses_version_2(tmp_path, monkeypatch):
+    page = (Path(__file__).parents[2] / "docs/roadmap-format.md").read_text()
+    reader = page.split("```python\n")[1].split("```")[0]
+    monkeypatch.chdir(tmp_path)
+    write_roadmap(sliced(), "seed-box.h5")
+    with pytest.raises(AssertionError):
+        exec(reader, {})
+    write_roadmap(sliced().at(0), "seed-box.h5")
+    exec(reader, {})
+
+
+def test_a_batch_of_many_departures_keeps_the_threads_busy():
+    question = problem()
+    legs = question.legs(sliced().position)
+    with threads(2):
+        assert nodes_of_batch(question, legs, 10**5) == 10**5 // legs.pairs_per_node // 4
+        assert nodes_of_batch(question, legs, 17 * legs.pairs_per_node) == 17
+        assert nodes_of_batch(replace(question, slices=()), legs, 17 * legs.pairs_per_node) == 17
 
 
 def test_the_last_departure_is_a_slice():
