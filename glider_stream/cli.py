@@ -416,10 +416,10 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
 
     looked = planner.lint(files, waypoints)
     if as_json:
-        _write_json([one.as_dict() for one in looked])
+        _write_json([result.as_dict() for result in looked])
     else:
         say("\n".join(map(str, looked)))
-    if any(one.faults for one in looked):
+    if any(result.faults for result in looked):
         sys.exit(1)
 
 

@@ -195,13 +195,13 @@ class OpenedScenario:
         on_globe = isinstance(domain, GeographicDomain)
         cure = "and the roadmap is in metres; give x, y, z in a CSV file"
         points = [] if start is None else [self._point(start)]
-        for file, one in zip(files, drawn, strict=True):
-            require(on_globe or not one.geographic, f"the route {file} is in longitude and latitude, {cure}")
-            points += [domain.point(place) if one.geographic else np.array(place) for place in one.places]
+        for file, drawing in zip(files, drawn, strict=True):
+            require(on_globe or not drawing.geographic, f"the route {file} is in longitude and latitude, {cure}")
+            points += [domain.point(place) if drawing.geographic else np.array(place) for place in drawing.places]
         require(len(points) > 1, f"the route {files[0]} holds one point; say with --start where the vehicle is")
         for n, point in enumerate(points, 1 if start is None else 0):
             self.problem.check_point(point, f"point {n}" if n else "start")
-        notes = [note for one in drawn for note in one.notes]
+        notes = [note for drawing in drawn for note in drawing.notes]
         if start is None and drawn[0].of_vehicle:
             notes.append("the way to its first point is not scored; say with --start where the vehicle is")
 
@@ -245,7 +245,7 @@ class OpenedScenario:
         problem = self.problem
         by = None if arrive_by is None else seconds(arrive_by, problem, "arrive-by")
         first, last = (problem.departure, by) if between is None else between
-        times = [seconds(one, problem, "depart-between") for one in (first, last) if one is not None]
+        times = [seconds(moment, problem, "depart-between") for moment in (first, last) if moment is not None]
         found = when_to_leave(
             lambda when: planner.leaving(when - problem.departure).query(*ends), times[0], times[-1], every, by
         )

@@ -46,9 +46,9 @@ def _shares(lines: list[str], groups: Path) -> Iterator[float]:
         # within a container the path may be that of the host, and only the top is there
         for folder in {top, here, *(parent for parent in here.parents if top in parent.parents)}:
             try:
-                words = (folder / quota).read_text().split()
-                words += (folder / period).read_text().split() if period else []
-                limit, each = float(words[0]), float(words[1])
+                numbers = (folder / quota).read_text().split()
+                numbers += (folder / period).read_text().split() if period else []
+                limit, each = float(numbers[0]), float(numbers[1])
             except (OSError, ValueError, IndexError):
                 continue  # no file, or "max"
             if limit > 0 and each > 0:

@@ -49,14 +49,14 @@ def _watch(ours: socket.socket) -> None:
     with ours:
         while True:
             try:
-                told = ours.recv(64)
+                received = ours.recv(64)
             except TimeoutError:
                 Murmur().write("glider-stream: stopping; press Ctrl-C again to end it at once\n")
                 ours.settimeout(None)
                 continue
-            if not told:
+            if not received:
                 return
-            count += told.count(signal.SIGINT)
+            count += received.count(signal.SIGINT)
             if count >= 2:
                 if Murmur().isatty():
                     Murmur().write("\x1b[?25h")  # a progress bar hides the cursor

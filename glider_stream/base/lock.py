@@ -126,8 +126,12 @@ def _myself() -> bytes:
 def _read(text: bytes) -> dict[str, Any]:
     """Who holds a lock; empty where it does not say so."""
     try:
-        told = json.loads(text)
-        return {"process": int(told["process"]), "machine": str(told["machine"]), "since": str(told["since"])}
+        holder = json.loads(text)
+        return {
+            "process": int(holder["process"]),
+            "machine": str(holder["machine"]),
+            "since": str(holder["since"]),
+        }
     except (ValueError, TypeError, KeyError, RecursionError):
         return {}
 

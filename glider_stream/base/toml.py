@@ -16,8 +16,8 @@ def check_depth(table: Mapping[str, Any], what: str) -> None:
     for _ in range(DEEPEST):
         level = [
             inner
-            for one in level
-            for inner in (one.values() if isinstance(one, Mapping) else one)
+            for item in level
+            for inner in (item.values() if isinstance(item, Mapping) else item)
             if isinstance(inner, (Mapping, list))
         ]
         if not level:

@@ -187,9 +187,10 @@ def merge(parts: Sequence[str | Path], output: str | Path) -> None:
         require(number not in seen, f"{path} and {seen.get(number)} are both part {part.shard}; leave one out")
         seen[number] = path
     lacks = [str(n) for n in range(1, first.shard.count + 1) if n not in seen]
-    said = f"part {lacks[0]}" if len(lacks) == 1 else f"parts {', '.join(lacks[:20])}"
+    missing = f"part {lacks[0]}" if len(lacks) == 1 else f"parts {', '.join(lacks[:20])}"
     require(
-        not lacks, f"{said} of {first.shard.count} {'is' if len(lacks) == 1 else 'are'} missing; build and add it"
+        not lacks,
+        f"{missing} of {first.shard.count} {'is' if len(lacks) == 1 else 'are'} missing; build and add it",
     )
     target = Path(output)
     require(

@@ -57,7 +57,9 @@ def software() -> dict[str, str]:
 def check_software(asked: dict[str, str]) -> None:
     """InputError, in a worker, unless it has what was asked for."""
     unlike = [
-        f"{name} {own} and not {asked.get(name)}" for name, own in software().items() if own != asked.get(name)
+        f"{name} {version} and not {asked.get(name)}"
+        for name, version in software().items()
+        if version != asked.get(name)
     ]
     require(not unlike, f"a worker has {', '.join(unlike)}; install the same there")
 
@@ -82,8 +84,8 @@ def _distributed() -> Any:
 def scheduler(address: str) -> Iterator["Cluster"]:
     """A Dask scheduler at an address, or "local:N": N worker processes here, for as long as the block runs."""
     distributed = _distributed()
-    own = re.fullmatch(r"local:(\d{1,4})", address)
-    if own is None:
+    local = re.fullmatch(r"local:(\d{1,4})", address)
+    if local is None:
         require(
             ":" in address, f"a scheduler is tcp://HOST:PORT, or local:N for N processes here; got {address!r}"
         )
@@ -93,10 +95,12 @@ def scheduler(address: str) -> Iterator["Cluster"]:
         except (OSError, TimeoutError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            said = " ".join(str(error).split())[:200]
-            raise InputError(f"no Dask scheduler answers at {address} ({said}); start one, or mend it") from None
+            message = " ".join(str(error).split())[:200]
+            raise InputError(
+                f"no Dask scheduler answers at {address} ({message}); start one, or mend it"
+            ) from None
         return
-    count = int(own.group(1))
+    count = int(local.group(1))
     require(count >= 1, f"a local cluster has 1 worker or more; got {address!r}")
     each = max(1, usable_cores() // count)
     with (

@@ -100,11 +100,11 @@ class Journal:
         if restart or not head.startswith(MAGIC) or len(line) < 2:
             return False
         try:
-            said = json.loads(line[0])
+            header = json.loads(line[0])
         except (ValueError, RecursionError):
-            said = {}
-        if not isinstance(said, dict) or said != dict(identity):
-            keys = sorted(key for key in {*identity, *said} if dict(said).get(key) != identity.get(key))
+            header = {}
+        if not isinstance(header, dict) or header != dict(identity):
+            keys = sorted(key for key in {*identity, *header} if dict(header).get(key) != identity.get(key))
             raise InputError(
                 f"{self.path} keeps the progress of another build, whose {', '.join(keys)} differ; "
                 "finish that one with its own command, or begin anew with --restart"
@@ -180,7 +180,7 @@ class Journal:
         arrays = edges.source, edges.degree, edges.target, edges.values, edges.counts
         kinds = [kind for _, kind in sizes]
         body = b"".join(
-            np.ascontiguousarray(one, kind).tobytes() for one, kind in zip(arrays, kinds, strict=True)
+            np.ascontiguousarray(array, kind).tobytes() for array, kind in zip(arrays, kinds, strict=True)
         )
         place = self._end
         self._write(head + body + hashlib.blake2b(head + body, digest_size=DIGEST).digest())

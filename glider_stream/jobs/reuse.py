@@ -45,7 +45,7 @@ def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
         "neighbours": (before.law, now.law),
         "departure": (before.departure, now.departure),
     }
-    unlike = [name for name, (one, other) in what.items() if one != other]
+    unlike = [name for name, (made_with, asked) in what.items() if made_with != asked]
     require(
         not unlike, f"the older roadmap has other {', '.join(unlike)}, and not only another flow; build afresh"
     )
@@ -59,8 +59,8 @@ def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
     return lattice.away_from(changed)
 
 
-def _same(one: Any, other: Any) -> bool:
-    return other is not None and np.array_equal(one, other)
+def _same(before: Any, after: Any) -> bool:
+    return after is not None and np.array_equal(before, after)
 
 
 class _Lattice:
@@ -88,18 +88,18 @@ class _Lattice:
         """Cells where flow or terrain differ; None where these cannot be compared point by point."""
         found = np.zeros(tuple(self.count), dtype=bool)
         terrains = self.before.evaluator.terrain, self.now.evaluator.terrain
-        for one, other in (self.flows, terrains):
-            now = fields_of(other)
-            unlike = {name for name, value in fields_of(one).items() if not _same(value, now.get(name))}
-            if type(one) is type(other) and not unlike:
+        for before, after in (self.flows, terrains):
+            now = fields_of(after)
+            unlike = {name for name, value in fields_of(before).items() if not _same(value, now.get(name))}
+            if type(before) is type(after) and not unlike:
                 continue
-            if type(one) is not type(other) or not unlike <= VALUES:
+            if type(before) is not type(after) or not unlike <= VALUES:
                 return None
-            if isinstance(other, (Grid, OceanGrid)) and isinstance(one, (Grid, OceanGrid)):
-                unlike = self._in_time(other, (one.values != other.values).any(axis=-1))
-                found |= self._touched(other, unlike.any(axis=tuple(range(unlike.ndim - 2))))
-            elif isinstance(other, Seabed) and isinstance(one, Seabed):
-                found |= self._touched(other, one.bottom != other.bottom)
+            if isinstance(after, (Grid, OceanGrid)) and isinstance(before, (Grid, OceanGrid)):
+                unlike = self._in_time(after, (before.values != after.values).any(axis=-1))
+                found |= self._touched(after, unlike.any(axis=tuple(range(unlike.ndim - 2))))
+            elif isinstance(after, Seabed) and isinstance(before, Seabed):
+                found |= self._touched(after, before.bottom != after.bottom)
             else:
                 return None
         return found
@@ -168,10 +168,10 @@ class _Lattice:
         rows, cols, costs = [], [], []
         for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
             here = (slice(None, -di or None), slice(max(0, -dj), None if dj <= 0 else -dj))
-            there = (slice(di, None), slice(max(0, dj), None if dj >= 0 else dj))
-            between = np.maximum(speed[here], speed[there])
+            shifted = (slice(di, None), slice(max(0, dj), None if dj >= 0 else dj))
+            between = np.maximum(speed[here], speed[shifted])
             rows.append(number[here].ravel())
-            cols.append(number[there].ravel())
+            cols.append(number[shifted].ravel())
             costs.append((self.step * np.hypot(di, dj) / between).ravel())
         graph = csr_array(
             (np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))),

@@ -142,9 +142,9 @@ def _stops(path: Path) -> Iterator[tuple[dict[str, Any], list[float]]]:
 
 
 def _child(parent: Xml.Element, tag: str, text: str | None = None, **attributes: str) -> Xml.Element:
-    one = Xml.SubElement(parent, tag, attributes)
-    one.text = text
-    return one
+    child = Xml.SubElement(parent, tag, attributes)
+    child.text = text
+    return child
 
 
 def _xml(root: Xml.Element, name: str) -> Texts:
@@ -164,8 +164,10 @@ def _kml(path: Path, name: str, options: Options) -> Texts:
     for row, place in list(_stops(path))[1:]:
         mark = _child(document, "Placemark")
         _child(mark, "name", row["name"])
-        said = f"heading {row['heading']} degrees, glide angle {row['glide_angle']} degrees, eta {row['eta']}"
-        _child(mark, "description", said)
+        description = (
+            f"heading {row['heading']} degrees, glide angle {row['glide_angle']} degrees, eta {row['eta']}"
+        )
+        _child(mark, "description", description)
         if path.departs is not None:
             _child(_child(mark, "TimeStamp"), "when", row["eta"])
         point = _child(mark, "Point")

@@ -142,13 +142,14 @@ def told_height(values: Mapping[str, Any], what: str) -> float | None:
     return next(iter(found.values()), None)
 
 
-def depth_of(third: float | None, told: float | None) -> float:
+def depth_of(third: float | None, property_height: float | None) -> float:
     """The depth [m] of a point, of its third coordinate and what its properties say [m, upward]; 0 if neither."""
-    if third and told is not None and third != told:
+    if third and property_height is not None and third != property_height:
         raise NotARoute(
-            f"a point has an altitude of {third:g} m and properties that say {told:g} m; keep one of them"
+            f"a point has an altitude of {third:g} m and properties that say {property_height:g} m; "
+            "keep one of them"
         )
-    return 0.0 - (third or told or 0.0)
+    return 0.0 - (third or property_height or 0.0)
 
 
 def csv_points(text: str) -> tuple[list[Any], bool]:

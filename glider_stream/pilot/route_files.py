@@ -69,9 +69,11 @@ def read_drawn(file: str | Path) -> Drawn:
     except OSError as error:
         raise InputError(f"the route {path} cannot be read: {error.strerror}; name another") from None
     except (*BROKEN, csv.Error, Xml.ParseError) as error:
-        said = " ".join(str(error).split())[:200] if isinstance(error, ValueError | csv.Error) else ""
-        said = said or ("its XML is broken" if isinstance(error, Xml.ParseError) else "it is not built as one is")
-        raise InputError(f"{path.name} cannot be read as a route: {said}; export it again") from None
+        message = " ".join(str(error).split())[:200] if isinstance(error, ValueError | csv.Error) else ""
+        message = message or (
+            "its XML is broken" if isinstance(error, Xml.ParseError) else "it is not built as one is"
+        )
+        raise InputError(f"{path.name} cannot be read as a route: {message}; export it again") from None
     # a vehicle's own list begins where the vehicle is
     least = 1 if form in VEHICLES else 2
     count = f"from {least} to {MOST_POINTS:,} points; got {len(points)}"
@@ -116,7 +118,10 @@ def _json(text: str) -> Found:
     for _, properties in lines:
         _check_line(properties)
     # what stands beside a line is a mark on the map, and places nothing but where it is ours
-    marks = [_mark(place, {"name": told.get("name", "")} if lines else told) for place, told in points]
+    marks = [
+        _mark(place, {"name": properties.get("name", "")} if lines else properties)
+        for place, properties in points
+    ]
     return Found(route_of([[_below(place, {}) for place in line] for line, _ in lines], marks, ours), True, [])
 
 
@@ -138,8 +143,8 @@ def _check_line(properties: dict[str, Any]) -> None:
 
 def _below(place: Any, properties: dict[str, Any]) -> tuple[Any, Any, float]:
     """lon, lat and an altitude as lon, lat, depth, which properties may say, too."""
-    told = told_height(properties, "property")
-    return place[0], place[1], depth_of(place[2] if len(place) > 2 else None, told)
+    height = told_height(properties, "property")
+    return place[0], place[1], depth_of(place[2] if len(place) > 2 else None, height)
 
 
 def _kml(text: str) -> Found:

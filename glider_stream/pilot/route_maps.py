@@ -82,12 +82,12 @@ def _kind(element: Xml.Element) -> str:
 
 
 def _named(tree: Xml.Element, name: str) -> list[Xml.Element]:
-    return [one for one in tree.iter() if _kind(one) == name]
+    return [element for element in tree.iter() if _kind(element) == name]
 
 
 def _text(tree: Xml.Element, name: str) -> str:
     """The text of the first child of that name, empty if there is none."""
-    return next(((one.text or "").strip() for one in tree if _kind(one) == name), "")
+    return next(((element.text or "").strip() for element in tree if _kind(element) == name), "")
 
 
 # KML
@@ -133,7 +133,7 @@ def kml_points(text: str) -> tuple[list[Place], list[str]]:
         raise NotARoute(
             f"its points lie in {len(folders)} folders ({names}), and a route is one; keep one of them"
         )
-    ours = any(one.text == OUR_NAME for one in _named(tree, "name"))
+    ours = any(element.text == OUR_NAME for element in _named(tree, "name"))
     if lines:
         # any other is a mark on the map, and how high it stands is nobody's concern
         points = [shape for shape in points if OURS.fullmatch(_name(shape))]
@@ -150,24 +150,26 @@ def _name(shape: _Shape) -> str:
 
 def _marked(shape: _Shape, notes: list[str]) -> list[Mark]:
     """The places of a point's element."""
-    told = None if shape.placemark is None else told_height(_data(shape.placemark), "data")
+    height = None if shape.placemark is None else told_height(_data(shape.placemark), "data")
     places = _coordinates(shape, notes)
-    return [Mark(_name(shape), (a, b, depth_of(0.0 - depth, told))) for a, b, depth in places]
+    return [Mark(_name(shape), (a, b, depth_of(0.0 - depth, height))) for a, b, depth in places]
 
 
 def _data(placemark: Xml.Element) -> dict[str, str]:
     """What a placemark's ExtendedData say, by name."""
-    data = {one.get("name", ""): _text(one, "value") for one in _named(placemark, "Data")}
-    return data | {one.get("name", ""): (one.text or "").strip() for one in _named(placemark, "SimpleData")}
+    data = {element.get("name", ""): _text(element, "value") for element in _named(placemark, "Data")}
+    return data | {
+        element.get("name", ""): (element.text or "").strip() for element in _named(placemark, "SimpleData")
+    }
 
 
 def _coordinates(shape: _Shape, notes: list[str]) -> list[Place]:
     """The places of a line or point: lon, lat, and the depth that the altitude mode gives them."""
     element = shape.element
     if _kind(element) == "Track":
-        values = [[float(value) for value in (one.text or "").split()] for one in _named(element, "coord")]
+        values = [[float(value) for value in (child.text or "").split()] for child in _named(element, "coord")]
     else:
-        texts = " ".join(one.text or "" for one in _named(element, "coordinates"))
+        texts = " ".join(child.text or "" for child in _named(element, "coordinates"))
         values = [[float(value) for value in place.split(",")] for place in texts.split()]
     if _kind(element) in LINES and shape.placemark is not None:
         height = told_height(_data(shape.placemark), "data")
@@ -204,7 +206,7 @@ def _heights(mode: str, heights: list[float], notes: list[str]) -> list[float]:
 def gpx_points(text: str) -> list[Place]:
     """The route of a GPX file, lon, lat [degrees], depth [m]: its route, else its track, else its way points."""
     tree = _tree(text)
-    routes, tracks = ([_gpx_marks(one, f"{kind}pt") for one in _named(tree, kind)] for kind in ("rte", "trk"))
+    routes, tracks = ([_gpx_marks(line, f"{kind}pt") for line in _named(tree, kind)] for kind in ("rte", "trk"))
     routes, tracks = ([marks for marks in some if marks] for some in (routes, tracks))
     for some, what in ((routes, "routes"), (tracks, "tracks")):
         if len(some) > 1 and (some is routes or not routes):
@@ -226,12 +228,12 @@ def gpx_points(text: str) -> list[Place]:
 def _gpx_marks(tree: Xml.Element, kind: str) -> list[Mark]:
     """Points of GPX with their names."""
     marks = []
-    for one in _named(tree, kind):
-        leaves = [inner for inner in one.iter() if len(inner) == 0 and inner is not one]
+    for point in _named(tree, kind):
+        leaves = [inner for inner in point.iter() if len(inner) == 0 and inner is not point]
         values = {_kind(inner): (inner.text or "").strip() for inner in leaves}
         height = values.pop("ele", "")
         name = values.pop("name", "")
-        told = told_height(values, "point's element")
-        depth = depth_of(float(height) if height else None, told)
-        marks.append(Mark(name, (float(one.attrib["lon"]), float(one.attrib["lat"]), depth)))
+        stated = told_height(values, "point's element")
+        depth = depth_of(float(height) if height else None, stated)
+        marks.append(Mark(name, (float(point.attrib["lon"]), float(point.attrib["lat"]), depth)))
     return marks

@@ -93,12 +93,12 @@ class Score:
         still = [FROZEN] if self.flown is not None and self.flown.frozen else []
         lines = [title, *(f"  note: {note}" for note in (*self.notes, *still))]
         for n, leg in enumerate(self.legs, 1):
-            said = "fails"
+            summary = "fails"
             if leg.time is not None:
-                said = f"{span(leg.time)}, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
+                summary = f"{span(leg.time)}, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
             if leg.status == Status.SAME_DEPTH and leg.glides:
-                said += " of the roadmap: one glide changes depth, and its ends lie at the same"
-            lines += [f"  leg {n}: {said}", *(f"    {next(glides).told(departs)}" for _ in range(leg.glides))]
+                summary += " of the roadmap: one glide changes depth, and its ends lie at the same"
+            lines += [f"  leg {n}: {summary}", *(f"    {next(glides).told(departs)}" for _ in range(leg.glides))]
         return "\n".join(lines)
 
 

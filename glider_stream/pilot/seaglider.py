@@ -38,7 +38,7 @@ class Target(NamedTuple):
 
     line: int
     name: str
-    said: dict[str, str]
+    values: dict[str, str]
 
 
 def read_targets(text: str) -> tuple[list[Target], list[str]]:
@@ -53,10 +53,10 @@ def read_targets(text: str) -> tuple[list[Target], list[str]]:
             faults.append(f"line {n} begins or ends with a blank")
         # public files have blanks after an equals sign
         name, *parts = re.sub(r"\s*=\s*", "=", line.strip()).split()
-        said = dict(part.split("=", 1) for part in parts if "=" in part)
-        if len(said) < len(parts) or "=" in name:
+        values = dict(part.split("=", 1) for part in parts if "=" in part)
+        if len(values) < len(parts) or "=" in name:
             faults.append(f"line {n} must be a name and key=value, each key once: {line.strip()!r}")
-        found.append(Target(n, name, said))
+        found.append(Target(n, name, values))
     return found, faults
 
 
@@ -67,26 +67,26 @@ def target_faults(text: str) -> list[str]:
     if not found:
         faults.append("there is no target")
     for target in found:
-        where, said = f"target {target.name} in line {target.line}", target.said
+        where, values = f"target {target.name} in line {target.line}", target.values
         if names.count(target.name) > 1 and names.index(target.name) < found.index(target):
             faults.append(f"{where} stands twice")
         if not re.fullmatch(r"\w+", target.name):
             faults.append(f"{where} must have a name of letters and numbers")
         for key in NEEDED:
-            if key not in said:
+            if key not in values:
                 faults.append(f"{where} has no {key}")
-        for key in said:
+        for key in values:
             if key not in (*NEEDED, *OPTIONAL):
                 faults.append(f"{where} says {key}, which is not known; look at its spelling")
         for key in ("goto", "escape"):
-            if key in said and said[key] not in names:
-                faults.append(f"{where} has {key}={said[key]}, and there is no such target")
+            if key in values and values[key] not in names:
+                faults.append(f"{where} has {key}={values[key]}, and there is no such target")
         for key, most in (("lat", 90.0), ("lon", 180.0)):
-            faults += _angle_fault(where, key, said.get(key), most)
+            faults += _angle_fault(where, key, values.get(key), most)
         for key, bounds in {"radius": (1e-3, 1e6), **OPTIONAL}.items():
-            if bounds is not None and key in said and not _within(said[key], *bounds):
+            if bounds is not None and key in values and not _within(values[key], *bounds):
                 faults.append(
-                    f"{where} has {key}={said[key]}, and it must be from {bounds[0]:g} to {bounds[1]:g}"
+                    f"{where} has {key}={values[key]}, and it must be from {bounds[0]:g} to {bounds[1]:g}"
                 )
     return faults
 
@@ -123,12 +123,12 @@ def target_points(text: str) -> tuple[list[tuple[float, float, float]], list[str
     name = found[0].name
     while name not in way:
         way.append(name)
-        name = by_name[name].said["goto"]
+        name = by_name[name].values["goto"]
     notes = [f"the targets begin with {way[0]}, the first of the file; the vehicle may be sent to another"]
     left = [target.name for target in found if target.name not in way]
     if left:
         notes.append(f"no goto leads from {way[0]} to {', '.join(left)}; they are not part of the route")
     if name != way[-1]:
         notes.append(f"the targets are flown again and again, from {name}; they are read once")
-    places = [[from_degrees_and_minutes(by_name[one].said[key]) for key in ("lon", "lat")] for one in way]
+    places = [[from_degrees_and_minutes(by_name[target].values[key]) for key in ("lon", "lat")] for target in way]
     return [(lon, lat, 0.0) for lon, lat in places], notes

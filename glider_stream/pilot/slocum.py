@@ -122,7 +122,7 @@ def clear_leftovers(folder: File, first: str, written: list[str]) -> list[str]:
     A list is removed where it is, to the letter, what this program writes. One that was changed by hand since is
     the pilot's, and stays.
     """
-    said, number = list[str](), list_number(first) + sum(1 for name in written if NAME.fullmatch(name))
+    messages, number = list[str](), list_number(first) + sum(1 for name in written if NAME.fullmatch(name))
     while number <= 99 and (file := folder / _list_name(number)).is_file():
         text = file.read_bytes()[:1_000_000].decode("utf-8", errors="replace")
         series = SERIES.search(text)
@@ -130,19 +130,19 @@ def clear_leftovers(folder: File, first: str, written: list[str]) -> list[str]:
             break
         if text == _written_again(text, int(series[1]), first):
             file.unlink()
-            said.append(f"removed {file}, which an earlier, longer route had left")
+            messages.append(f"removed {file}, which an earlier, longer route had left")
         else:
-            said.append(
+            messages.append(
                 f"{file} is of an earlier route, and was changed since: it stays; remove it unless you need it"
             )
         number += 1
-    return said
+    return messages
 
 
 def _written_again(text: str, part: int, first: str) -> str | None:
     """What this program would write for the waypoints of a list; None where it cannot be one of ours."""
     file = read_mission_file(text)
-    radius = next((one.value for one in file.arguments if one.name == "list_when_wpt_dist"), "")
+    radius = next((argument.value for argument in file.arguments if argument.name == "list_when_wpt_dist"), "")
     try:
         rows = [[from_degrees_and_minutes(part) for part in row.split()] for _, row in file.rows]
         return goto_list([Waypoint(lon, lat) for lon, lat in rows], float(radius), part, first)

@@ -125,8 +125,8 @@ def read_mission_file(text: str) -> MissionFile:
             seen.append(mark[2])
         elif block == "waypoints":
             rows.append((n, line))
-        elif block == "b_arg" and (one := re.fullmatch(r"b_arg:\s*(\w+)\(([^)]*)\)\s*(.*)", line)):
-            arguments.append(Argument(n, one[1], one[2], one[3]))
+        elif block == "b_arg" and (match := re.fullmatch(r"b_arg:\s*(\w+)\(([^)]*)\)\s*(.*)", line)):
+            arguments.append(Argument(n, match[1], match[2], match[3]))
         else:
             faults.append(f"line {n} is neither an argument nor a waypoint: {line!r}")
     if block or seen.count("b_arg") != 2:
@@ -148,9 +148,9 @@ def goto_faults(text: str, most: int = MOST_WAYPOINTS) -> list[str]:
         return [*faults, "the waypoints must stand between <start:waypoints> and <end:waypoints>"]
     values = _values(file, GOTO_LIST, faults)
     count = len(file.rows)
-    said = values.get("num_waypoints")
-    if said is None or said != count:
-        shown = "not said" if said is None else f"{said:g}"
+    number = values.get("num_waypoints")
+    if number is None or number != count:
+        shown = "not said" if number is None else f"{number:g}"
         faults.append(f"num_waypoints is {shown}, and there are {count} rows")
     if count > most:
         faults.append(f"{count} waypoints are more than {most}")

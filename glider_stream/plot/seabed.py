@@ -35,9 +35,9 @@ def sample_bottom(terrain: Terrain, x: ArrayLike, y: ArrayLike) -> Array:
     ground = ground_of(terrain)
     x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
     low, high = np.full(x.shape, DEEPEST), np.zeros(x.shape)
-    none, land = sample_water(ground, x, y, low), ~sample_water(ground, x, y, high)
+    unknown, land = sample_water(ground, x, y, low), ~sample_water(ground, x, y, high)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         wet = sample_water(ground, x, y, middle)
         low, high = np.where(wet, low, middle), np.where(wet, middle, high)
-    return np.where(land, 0.0, np.where(none, -np.inf, 0.5 * (low + high)))
+    return np.where(land, 0.0, np.where(unknown, -np.inf, 0.5 * (low + high)))

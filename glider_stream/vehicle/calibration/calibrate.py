@@ -125,7 +125,7 @@ def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str
     ratio = dict(zip(fit.names, np.exp(fit.logs), strict=True))
     parameters = {}
     for name, error in zip(fit.names, fit.errors, strict=True):
-        before = problem.own if name in problem.groups else float(getattr(base, name))
+        before = problem.volume if name in problem.groups else float(getattr(base, name))
         value = before * float(ratio[name])
         parameters[name] = Parameter(value, value * float(error), before, "cc" if name in problem.groups else "")
     flown = problem.flown(fit.names, fit.logs)

@@ -81,8 +81,8 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
     found = _found(path.name, header, columns or {})
     listed = f"; it has: {', '.join(header)}"
     require("vertical" in found, f"{path.name} has no column of vertical speeds, name it by `vertical`{listed}")
-    told = {"horizontal", "pitch", "glide_angle"} & set(found)
-    require(bool(told), f"{path.name} must have a horizontal speed, a pitch or a glide angle, name one{listed}")
+    given = {"horizontal", "pitch", "glide_angle"} & set(found)
+    require(bool(given), f"{path.name} must have a horizontal speed, a pitch or a glide angle, name one{listed}")
     twice = "buoyancy" in found and "net_mass" in found
     require(not twice, f"{path.name} has a buoyancy in cc and one in kg; leave one out{listed}")
     if "horizontal" in found:
@@ -105,9 +105,9 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
                 down = values[what] < 0
                 found["phase"] = f"{found[what]}, below 0 in a dive"
                 break
-    for what, one in values.items():
-        _check_signs(path.name, line, one, None if what == "horizontal" else down, found[what])
-        values[what] = np.abs(one)
+    for what, speeds in values.items():
+        _check_signs(path.name, line, speeds, None if what == "horizontal" else down, found[what])
+        values[what] = np.abs(speeds)
     for what in ("pitch", "glide_angle"):
         if what in values:
             values[what] = np.radians(values[what])
@@ -160,17 +160,17 @@ def _rows(reader: Iterator[list[str]], name: str, width: int) -> Iterator[tuple[
         yield line, row
 
 
-def _found(name: str, header: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
+def _found(name: str, header: Sequence[str], columns: Mapping[str, str]) -> dict[str, str]:
     """The column for each of COLUMNS that there is."""
-    for what, column in said.items():
+    for what, column in columns.items():
         require(what in COLUMNS, f"`{what}` is not known; choose from: {', '.join(COLUMNS)}")
         require(column in header, f"{name} has no column `{column}`; it has: {', '.join(header)}")
-    found = dict(said)
+    found = dict(columns)
     for what, usual in COLUMNS.items():
-        here = [column for column in header if column.lower() in usual and column not in said.values()]
+        here = [column for column in header if column.lower() in usual and column not in columns.values()]
         if what not in found and here:
-            one = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
-            require(len(here) == 1, one)
+            message = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
+            require(len(here) == 1, message)
             found[what] = here[0]
     return found
 

@@ -45,7 +45,7 @@ class FitProblem:
 
     dives: Dives
     base: Glider
-    own: float
+    volume: float
     kinds: tuple[str, ...]
     groups: dict[str, NDArray[np.bool_]]
     recorded: Array | None
@@ -53,9 +53,9 @@ class FitProblem:
     def flown(self, names: tuple[str, ...], logs: Array) -> Flown:
         """The vehicle with fitted values."""
         ratio = dict(zip(names, np.exp(logs), strict=True))
-        volumes = np.full(self.dives.vertical.size, self.own) if self.recorded is None else self.recorded
+        volumes = np.full(self.dives.vertical.size, self.volume) if self.recorded is None else self.recorded
         for name, group in self.groups.items():
-            volumes = np.where(group, self.own * ratio[name], volumes)
+            volumes = np.where(group, self.volume * ratio[name], volumes)
         return Flown(self.base, self.values(ratio), volumes)
 
     def flat(self, fit: Fit) -> NDArray[np.bool_]:

@@ -59,7 +59,7 @@ class Calibration:
             "took": self.dives.took,
             "unused": list(self.dives.unused),
             "loss": "least squares, plain",
-            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
+            "parameters": {name: asdict(parameter) for name, parameter in self.parameters.items()},
             "held": self.held,
             "vertical_scatter_mps": scatter(self.vertical_off, len(self.parameters)),
             "horizontal_scatter_mps": None if across is None else scatter(across, len(self.parameters)),
@@ -78,9 +78,9 @@ class Calibration:
         if self.dives.unused:
             lines.append(_line("not used", ", ".join(map(plain, self.dives.unused))))
         lines.append(_line("fit", "plain least squares; +- is one standard error, what is held taken for right"))
-        for name, one in self.parameters.items():
-            value = f"{one.value:.5g} +- {one.error:.2g} {one.unit}".rstrip()
-            lines.append(_line(name, f"{value} (the preset has {one.before:.5g})"))
+        for name, parameter in self.parameters.items():
+            value = f"{parameter.value:.5g} +- {parameter.error:.2g} {parameter.unit}".rstrip()
+            lines.append(_line(name, f"{value} (the preset has {parameter.before:.5g})"))
         lines += [_line(name, f"held: {why}") for name, why in self.held.items()]
         for name, off, within in (
             ("vertical", self.vertical_off, self.vertical_within),
@@ -103,12 +103,12 @@ class Calibration:
         return "\n".join([*lines, f"  {self.glider}"])
 
 
-def _line(name: str, said: str) -> str:
-    return f"  {name:<14} {said}"
+def _line(name: str, value: str) -> str:
+    return f"  {name:<14} {value}"
 
 
 def _values(glider: Glider) -> dict[str, Any]:
-    return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(glider).items()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(glider).items()}
 
 
 def scatter(off: Array, fitted: int) -> float:
