@@ -102,7 +102,7 @@ def test_where_the_water_outruns_the_vehicle(search):
     problem = replace(search.problem, evaluator=replace(search.problem.evaluator, polar=polar))
     said = card(search.query(), problem)
     assert said.whole.outrun
-    assert "no holding station on legs" in str(said)
+    assert "it cannot hold station on legs" in str(said)
 
 
 # thinning
@@ -142,7 +142,7 @@ def test_thinning_keeps_what_no_glide_joins():
     flown.clear()
     thin(path, 50.0, lambda a, b, since: good, lambda hops: flown.extend(hops) or path)
     assert len(flown) == 3  # the stops lie far from the lines
-    with pytest.raises(InputError, match="0 m or more"):
+    with pytest.raises(InputError, match="at least 10 m"):
         thin(path, -1.0, lambda a, b, since: good, lambda hops: path)
 
 

@@ -296,7 +296,7 @@ class Catalogue:
         return hits[0] if hits else None
 
     def kind(self, name: str) -> str | None:
-        """Return the axis of a coordinate: "lon", "lat", "depth", "time", "sigma" (terrain-following), or None."""
+        """Return a coordinate's axis: "lon", "lat", "depth", "time", "sigma" (terrain-following), or None."""
         variable = self.data[name]
         for kind in WORDS:
             if getattr(self.names, kind) == name:
