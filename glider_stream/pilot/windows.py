@@ -19,8 +19,7 @@ MOST_WINDOWS = 100_000
 
 @dataclass(frozen=True)
 class Window:
-    """A window from `start` to `end` [s since departure]: the vehicle is in this box and between these depths
-    [m].
+    """A window: the box and the depths [m] of the vehicle from `start` to `end` [s since departure].
 
     `west`, `south`, `east` and `north` are in degrees if the route is geographic; then east is greater than west
     even across the date line. Otherwise they are x, y [m].
