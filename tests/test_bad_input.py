@@ -137,7 +137,7 @@ SCENARIOS = {
     "a domain in the air": (
         "z = [-150.0, 0.0]",
         "z = [-150.0, 9.0]",
-        "`domain.z` must end at 0 .the surface. or below",
+        "`domain.z` must end at 0 (the surface) or below",
         "got 9",
     ),
     "no candidate": (

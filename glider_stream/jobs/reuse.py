@@ -123,7 +123,7 @@ class _Lattice:
         return np.asarray(sums[k, m] - sums[i, m] - sums[k, j] + sums[i, j] > 0)
 
     def _reads(self, grid: Grid | OceanGrid | Seabed, shape: tuple[int, ...]) -> tuple[Any, Any]:
-        """Return the first point of a grid that each cell reads and the point after the last, (2, ni, nj) each."""
+        """Return the first grid point that each cell reads, and the point after the last, (2, ni, nj) each."""
         if id(grid) in self._known:
             return self._known[id(grid)]
         axes = (self.low[n] + self.step * np.arange(self.count[n] + 1) for n in range(2))
@@ -190,7 +190,7 @@ class _Lattice:
         return np.asarray((time / DETOUR - slack).reshape(changed.shape))
 
     def _speeds(self) -> Array:
-        """Return a bound of the fastest current in each cell, at any depth and time: the maximum at its points."""
+        """Return a bound of the fastest current in each cell, at any depth and time."""
         flow = self.flows[1]
         result = np.full(tuple(self.count), flow.extent.max_speed)
         if not isinstance(flow, (Grid, OceanGrid)):

@@ -63,7 +63,7 @@ class Energy:
         return cost.Cost(float(self.hotel), float(self.trim))
 
     def inflection(self, z: ArrayLike) -> Array | None:
-        """Return the energy [J] of the pump where a dive becomes a climb at heights z [m]: rho g |z| dV / eta(z)."""
+        """Return the pump's energy [J] where a dive becomes a climb at heights z [m]: rho g |z| dV / eta(z)."""
         depth = np.abs(np.asarray(z, np.float64))
         known, shares = (np.array(column) for column in zip(*self.efficiency, strict=True))
         share = np.interp(depth, known, shares)

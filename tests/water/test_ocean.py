@@ -322,7 +322,7 @@ REFUSALS = {
     "sigma": (lambda d: with_attrs(d, "depth", standard_name="ocean_s_coordinate_g2"), "no depth of the seabed"),
     "pressure": (lambda d: with_attrs(d, "depth", units="dbar"), "'dbar'"),
     "heights": (lambda d: with_attrs(d, "depth", positive="up"), "positive up"),
-    "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no longitude"),
+    "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no coordinate that is known"),
     "no time unit": (lambda d: without_attr(d, "time", "units"), "hours since"),
     "odd time unit": (lambda d: with_attrs(d, "time", units="fortnights since 2000-01-01"), "fortnights"),
     "dates that are none": (

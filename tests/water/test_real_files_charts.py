@@ -53,7 +53,7 @@ def test_no_data_that_is_not_declared_is_land(tmp_path, mark, sea):
     assert (bottom.height[inside] >= 0).all()
     assert (bottom.height < -900).sum() > 300
     if abs(mark) != 999.0 or mark < 0:
-        assert f"{mark:g} (" in bottom.words.replace(",", "")
+        assert f"{mark:g} (" in bottom.description.replace(",", "")
 
 
 @pytest.mark.parametrize("mark", [9999.0, 999.0, 10000.0, -9999.0, 32767.0])
@@ -62,7 +62,7 @@ def test_no_data_among_depths_that_count_down(tmp_path, mark):
     bottom = read_bathymetry(path, FRAME, *DOMAIN, positive="down")
     inside = np.isclose(bottom.grid.mesh()[1], 38.0) & np.isclose(bottom.grid.mesh()[0], 18.0)
     assert (bottom.height[inside] == 0).all()
-    assert f"where {mark:g} (" in bottom.words
+    assert f"where {mark:g} (" in bottom.description
 
 
 @pytest.mark.parametrize(

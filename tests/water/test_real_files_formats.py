@@ -414,7 +414,7 @@ def test_a_group_of_a_file(tmp_path):
 
 def test_files_of_one_step_without_time(tmp_path):
     steps = [written(tmp_path, dataset(hours=[h]).isel(time=0, drop=True), f"{h:g}.nc") for h in (0.0, 6.0, 12.0)]
-    with pytest.raises(InputError, match="set `origin`, the date of the first, and `step`"):
+    with pytest.raises(InputError, match=r"set `origin` .the date of the first. and `step`"):
         read_currents(steps)
     file = read_currents(steps, {"origin": "2024-11-20T00:00", "step": 6})
     assert at_hours(file, 9.0) == pytest.approx(current(20.5, 60.5, 20.0, 9.0), abs=1e-3)
