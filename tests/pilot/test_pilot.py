@@ -142,7 +142,7 @@ def test_thinning_keeps_what_no_glide_joins():
     flown.clear()
     thin(path, 50.0, lambda a, b, since: good, lambda hops: flown.extend(hops) or path)
     assert len(flown) == 3  # the stops lie far from the lines
-    with pytest.raises(InputError, match="at least 10 m"):
+    with pytest.raises(InputError, match="0 m or more"):
         thin(path, -1.0, lambda a, b, since: good, lambda hops: path)
 
 
