@@ -105,7 +105,7 @@ def scheduler(address: str) -> Iterator["Cluster"]:
     each = max(1, usable_cores() // count)
     with (
         distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
