@@ -126,10 +126,15 @@ def test_a_list_of_ours_is_scored(geographic, tmp_path, capsys, name):
     assert table["legs"][-1]["to"] == pytest.approx([*path.goal[:2], 0.0], abs=0.2)
     if len(waypoints) == 1:
         refused = command(capsys, "score", road, tmp_path / name)
-        assert (refused.code, "holds one point; say with --start" in refused.err) == (2, True)
+        assert (refused.code, "holds one point; give the vehicle's position with --start" in refused.err) == (
+            2,
+            True,
+        )
     else:
         told = command(capsys, "score", road, tmp_path / name)
-        assert "note: the way to its first point is not scored; say with --start" in told.out
+        assert (
+            "note: the way to its first point is not scored; give the vehicle's position with --start" in told.out
+        )
 
 
 def test_several_files_are_one_route(geographic, tmp_path, capsys):

@@ -497,7 +497,7 @@ def test_an_error_of_our_own_is_no_damage_of_the_file(tmp_path):
     run = [sys.executable, "-c", program, "describe", str(path)]
     told = subprocess.run(run, capture_output=True, text=True)
     assert told.returncode == 3
-    assert "an error of this program, and not of your input: ValueError: cannot reshape" in told.stderr
+    assert "this is an error of the program, not of your input: ValueError: cannot reshape" in told.stderr
     assert "damaged" not in told.stderr
     assert len(told.stderr.splitlines()) == 1
     traced = subprocess.run(run, capture_output=True, text=True, env=dict(os.environ, GLIDER_STREAM_TRACE="1"))
