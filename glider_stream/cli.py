@@ -540,7 +540,10 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line; exit code 0: done, 1: no path or a failed check, 2: unusable input, 3: an error here."""
+    """Run the command line.
+
+    Exit codes: 0 done; 1 no path or a failed check; 2 unusable input; 3 an error of this program.
+    """
     if hasattr(sys.stdout, "reconfigure"):
         # a name that is not UTF-8, or a letter that an old terminal does not have, is written as \\udcff
         sys.stdout.reconfigure(errors="backslashreplace")
