@@ -204,7 +204,7 @@ class Scenario:
         return flow, seabed, f"{text}; {also}"
 
     def _grounds(self, box: tuple[Array, Array], bottoms: list[Bottom]) -> tuple[Seabed, str]:
-        """Return the terrain over a box [m] and a text on it, from the known bottoms and the [terrain] section."""
+        """Return the terrain over a box [m] and a text on it: the known bottoms and the [terrain] section."""
         require(
             isinstance(self.domain, GeographicDomain),
             "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
