@@ -213,7 +213,7 @@ def test_parts_that_do_not_fit(place):
         ("part1.h5", "part3.h5"): "part 2 of 3 is missing",
         ("part2.h5",): "parts 1, 3 of 3 are missing",
         ("part1.h5", "part2.h5", "part2.h5"): "part2.h5 and part2.h5 are both part 2/3",
-        ("part1.h5", "half.h5"): "half.h5 is part 1/2 and part1.h5 part 1/3",
+        ("part1.h5", "half.h5"): "half.h5 is part 1/2 but part1.h5 is part 1/3",
         (
             "part1.h5",
             "part2.h5",

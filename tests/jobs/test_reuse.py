@@ -76,11 +76,11 @@ def test_what_cannot_be_taken_over(capsys, place):
     command(capsys, "build", "small.toml", "-o", "small.h5")
     command(capsys, "build", "a.toml", "-o", "old.h5")
     for sets, words in {
-        "glider.preset=seaglider": "has other glider",
-        "integration.steps=121": "has other integration",
-        "neighbours.k=13": "has other neighbours",
-        "steering.generations=2": "has other steering",
-        "sampling.count=99": "has other nodes",
+        "glider.preset=seaglider": "differs in glider",
+        "integration.steps=121": "differs in integration",
+        "neighbours.k=13": "differs in neighbours",
+        "steering.generations=2": "differs in steering",
+        "sampling.count=99": "differs in nodes",
     }.items():
         said = command(capsys, "build", "a.toml", "-o", "new.h5", "--from", "old.h5", "--set", sets)
         assert (said.code, words in said.err) == (2, True), said.err

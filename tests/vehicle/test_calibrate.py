@@ -229,7 +229,7 @@ def test_dives_too_flat_for_the_vehicle_and_far_off_are_named(tmp_path):
     [
         ("", "must hold a header and one line"),
         ("w,u\n\n,\n", "must hold a header and one line"),
-        ("a,b\n1,2\n", "no column of vertical speeds, name it by `vertical`; it has: a, b"),
+        ("a,b\n1,2\n", "no column of vertical speeds; name it by `vertical`; it has: a, b"),
         ("w,a\n0.1,2\n", "must have a horizontal speed, a pitch or a glide angle; name one; it has: w, a"),
         ("w,u\n0.1,0.2\n", "at least 3 dives; got 1"),
         ("w,u\n0.1,x\n", "line 2 of dives.csv: u = 'x' is not a number"),
