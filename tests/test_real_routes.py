@@ -52,7 +52,7 @@ def test_a_hundred_kilometres_and_its_files(tmp_path, monkeypatch, name):
     road = planner.build(scenario, "road.h5")
     if name == "washington":
         assert (
-            "names no depth: its current is taken as the surface's and held at all depths" in road.provenance.flow
+            "has no depth: its current is taken as the surface's and held at all depths" in road.provenance.flow
         )
         assert "changes with time, and legs hold for departure at 0 s" in road.provenance.flow
     path = planner.query("road.h5")

@@ -274,7 +274,7 @@ def test_when_to_leave(tmp_path, capsys, monkeypatch):
     for wrong, words in (
         (("--depart-between", "0", "soon"), "must be seconds or a time"),
         (("--depart-between", "9", "1"), "must not lie after the last"),
-        (("--every", "5"), "go with --depart-between"),
+        (("--every", "5"), "need --depart-between"),
         (("--arrive-by", "2024-01-01", "--thin", "5"), "leave|set query.departure"),
         (("--arrive-by", "2024-01-01T00:00"), "has no calendar"),
     ):
