@@ -56,7 +56,7 @@ def test_what_changed_of_a_sliced_roadmap_is_found_out(tmp_path):
     planner.build(scenario, tmp_path / "new.h5", base=tmp_path / "old.h5")
     assert planner.differ(tmp_path / "old.h5", tmp_path / "new.h5").same_edges
     fewer = read_scenario("swinging-gyre", [*DEPARTURES, "departures.last=1200"])
-    with pytest.raises(InputError, match="other departure"):
+    with pytest.raises(InputError, match="differs in departure"):
         planner.build(fewer, tmp_path / "new.h5", base=tmp_path / "old.h5")
 
 

@@ -64,7 +64,7 @@ def test_a_departure_beside_the_slices_is_answered_without_them(road):
         (["--depart", "soon"], "must be seconds or a time such as"),
         (["--depart", "2024-10-29T06:00"], "the flow has no calendar; give seconds"),
         (["--depart", "nan"], "must be a finite time"),
-        (["--depart", "0", "--depart-between", "0", "600"], "--depart goes with neither"),
+        (["--depart", "0", "--depart-between", "0", "600"], "--depart cannot be used with"),
     ],
 )
 def test_departures_that_make_no_sense_are_refused(file, capsys, given, says):
