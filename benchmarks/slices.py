@@ -6,13 +6,17 @@ from statistics import median
 
 import click
 import numpy as np
+from end_to_end import replayed
 
+import glider_stream
 from glider_stream.base.threads import threads
 from glider_stream.kernels.edges import CONNECTED, STATUS, TIME
 from glider_stream.roadmap.builder import build_slices, node_positions, warm_up
 from glider_stream.roadmap.follow import Follower
 from glider_stream.scenario import read_scenario
+from glider_stream.search.slice_planner import SlicePlanner
 from glider_stream.search.sliced import SliceSearch
+from glider_stream.search.time_dependent import ClockPlanner
 
 TIMES = 3
 """How often each slice is made; the least processor time counts."""
@@ -54,23 +58,33 @@ def compare(problem, position, every):
     print(f"a further slice costs {np.mean(costs[1:]):.2f} of one by fans")
 
 
-def ask(problem, road, count):
-    """Queries between random nodes at random departures: seconds each, rounds, how far slices were off."""
+def ask(planner, count, compared, reserve):
+    """Queries between random nodes at random departures: seconds each; some flown, and compared."""
     random = np.random.default_rng(0)
-    search = SliceSearch(road, problem)
-    took, rounds, off = [], [], []
-    for _ in range(count):
+    road = planner.slices.roadmap
+    planner.query(road.position[-2], road.position[-1])
+    took, missed, slower, alone = [], [], [], []
+    for number in range(count):
         start, goal = road.position[random.choice(len(road.position), 2, replace=False)]
-        departure = random.uniform(road.departures[0], road.departures[-1])
+        since = random.uniform(road.departures[0], road.departures[-1] - reserve) - planner.problem.departure
         began = time.perf_counter()
-        _, agreement = search.fastest(start, goal, departure)
+        path = planner.leaving(since).query(start, goal)
         took.append(time.perf_counter() - began)
-        rounds.append(agreement.rounds)
-        off.append(agreement.most)
-    print(
-        f"{count} queries: {median(took):.3f} s, {max(took):.3f} s at most; {median(rounds):.0f} searches, "
-        f"{max(rounds)} at most; slices off by {median(off):.2g} s, {max(off):.2g} s at most"
-    )
+        if number >= compared or not path.found:
+            continue
+        missed.append(float(np.linalg.norm(replayed(planner.problem.evaluator.flow, path.as_dict())[-1] - goal)))
+        began = time.perf_counter()
+        other = ClockPlanner(planner.leaving(since).problem, road.position).query(start, goal)
+        alone.append(time.perf_counter() - began)
+        slower.append(path.travel_time / other.travel_time - 1)
+        print(f"  {path.travel_time:,.1f} s, without slices {other.travel_time:,.1f} s; {'; '.join(path.notes)}")
+    print(f"{count} queries: {median(took):.3f} s, {max(took):.3f} s at most")
+    if missed:
+        print(
+            f"{len(missed)} of them flown by DOP853: {max(missed):.2g} m from the goal at most; slower than "
+            f"without slices by {np.mean(slower):.3%} on average, {max(slower):.2%} at most, {min(slower):.2%} "
+            f"at least; without slices {median(alone):.2f} s"
+        )
 
 
 @click.command()
@@ -81,8 +95,19 @@ def ask(problem, road, count):
 @click.option("--count", default=24, help="Slices.")
 @click.option("--every", default=12, help="One node in so many is compared; 0 for none.")
 @click.option("--queries", default=20, help="Queries over the whole roadmap; 0 for none.")
-def main(scenario, overrides, first, last, count, every, queries):
+@click.option("--compared", default=0, help="So many of them are flown, and found again without slices.")
+@click.option("--reserve", default=5000.0, help="Queries leave so long before the last slice [s].")
+@click.option("--roadmap", help="A roadmap file that is queried instead of building one.")
+def main(scenario, overrides, first, last, count, every, queries, compared, reserve, roadmap):
     """Compare, build and ask."""
+    if roadmap:
+        began = time.perf_counter()
+        opened = glider_stream.open(roadmap)
+        problem, road = opened.problem, opened.roadmap
+        print(f"read in {time.perf_counter() - began:.1f} s")
+        print(road)
+        ask(opened.planner(), queries, compared, reserve)
+        return
     problem = read_scenario(scenario, overrides).problem()
     problem = replace(problem, slices=tuple(np.linspace(first, last, count).tolist()))
     position = node_positions(problem)
@@ -93,8 +118,7 @@ def main(scenario, overrides, first, last, count, every, queries):
     if queries:
         road = build_slices(problem)
         print(f"{len(position):,} nodes, {count} slices, {road.target.size:,} edges in {road.wall_s:.1f} s")
-        SliceSearch(road, problem).fastest(position[-2], position[-1], first)
-        ask(problem, road, queries)
+        ask(SlicePlanner(problem, SliceSearch(road, problem)), queries, compared, reserve)
 
 
 if __name__ == "__main__":

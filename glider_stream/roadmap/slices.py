@@ -23,6 +23,12 @@ class SlicedRoadmap:
 
     As `Roadmap`, but `indptr` (n slices + 1,) has a row for each node and departure, as `rows_of` numbers
     them, and `row_counts` (n slices, statuses) are the pairs of each.
+
+    Examples:
+        >>> departures = ["departures.first=0", "departures.last=600", "departures.every=600"]
+        >>> road = planner.build("swinging-gyre", overrides=["sampling.shape=[4, 3, 2]", *departures])
+        >>> road.departures.tolist(), len(road.at(1).position)
+        ([0.0, 600.0], 26)
     """
 
     departures: Array

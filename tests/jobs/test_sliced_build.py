@@ -8,6 +8,7 @@ from helpers.slices import DEPARTURES, problem, sliced
 from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped
 from glider_stream.jobs import build as jobs
+from glider_stream.jobs import cluster
 from glider_stream.roadmap.store import read_any_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario
 
@@ -39,6 +40,15 @@ def test_parts_merge_to_the_same_bits(tmp_path, expected):
         planner.build_part(scenario, part, f"{n}/3")
     merged = planner.merge(parts, tmp_path / "road.h5")
     assert merged.departures.tolist() == sliced().departures.tolist()
+    assert datasets(tmp_path / "road.h5") == expected
+
+
+@pytest.mark.filterwarnings("ignore")  # dask's own words while its workers end
+def test_a_cluster_gives_the_same_bits(tmp_path, expected):
+    pytest.importorskip("distributed")
+    with cluster.scheduler("local:1") as workers:
+        job = jobs.Job(finder=workers.find_edges, warm=False)
+        jobs.build_file(problem(), tmp_path / "road.h5", job=job, batch_pairs=100 * BATCH)
     assert datasets(tmp_path / "road.h5") == expected
 
 
