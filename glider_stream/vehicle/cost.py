@@ -20,9 +20,9 @@ class TravelTime:
 
     unit: ClassVar[str] = "s"
 
-    def kernel(self) -> cost.Cost:
+    def kernel(self) -> cost.CostRates:
         """Return the cost of a second and of a leg, for the kernels; the fastest control is the cheapest."""
-        return cost.Cost(1.0, 0.0)
+        return cost.CostRates(1.0, 0.0)
 
     def inflection(self, z: ArrayLike) -> Array | None:
         """Return the cost of a turn from dive to climb at heights z [m]; None if turns are free."""
@@ -58,9 +58,9 @@ class Energy:
         within = min(share) > 0 and max(share) <= 1
         require(within, f"the shares of `cost.efficiency` must be above 0, at most 1; got {list(share)}")
 
-    def kernel(self) -> cost.Cost:
+    def kernel(self) -> cost.CostRates:
         """Return the rate [W] and the fixed cost [J] of a leg, for the kernels; a cost rises with time."""
-        return cost.Cost(float(self.hotel), float(self.trim))
+        return cost.CostRates(float(self.hotel), float(self.trim))
 
     def inflection(self, z: ArrayLike) -> Array | None:
         """Return the pump's energy [J] where a dive becomes a climb at heights z [m]: rho g |z| dV / eta(z)."""
