@@ -313,16 +313,8 @@ def _answer(
         for output in outputs:
             check_export(output)
         source = opened()
-        path = source.query(
-            start,
-            goal,
-            outputs=outputs,
-            most_energy=most_energy,
-            polish=polish,
-            thin=thin,
-            surfacing=rule,
-            **asked,
-        )
+        asked |= {"most_energy": most_energy, "polish": polish, "thin": thin, "surfacing": rule}
+        path = source.query(start, goal, outputs=outputs, **asked)
         for note in path.notes:
             say(f"note: {note}", error=True)
         answer, found = source.card(path) if as_card and path.found else path, path.found
