@@ -535,6 +535,7 @@ def test_roadmaps_of_another_problem(capsys, place, case):
 # through the installed command, as a user sees it
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "names"),
     [
@@ -559,6 +560,7 @@ def test_an_environment_that_numba_cannot_use(place, threads):
     assert_refused(said, f"NUMBA_NUM_THREADS must be a whole number above 0; got {threads!r}")
 
 
+@pytest.mark.slow
 def test_standard_output_that_takes_nothing(place):
     with open("/dev/full", "w") as full:
         code, _, err = run_with({}, "info", "road.h5", stdout=full)

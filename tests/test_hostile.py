@@ -32,6 +32,8 @@ from glider_stream.water.frame import LocalFrame
 from glider_stream.water.ocean.bathymetry import read_bathymetry
 from glider_stream.water.terrain import read_polygons
 
+pytestmark = pytest.mark.slow
+
 xr = pytest.importorskip("xarray")
 
 EXAMPLES = int(os.environ.get("GLIDER_STREAM_EXAMPLES", "25"))

@@ -17,6 +17,8 @@ from glider_stream.roadmap.verify import verify
 from glider_stream.scenario import read_scenario
 from glider_stream.search.path import SURFACE
 
+pytestmark = pytest.mark.slow
+
 gpxpy, kml, shapely, pyproj = (
     pytest.importorskip(name) for name in ("gpxpy", "fastkml.kml", "shapely", "pyproj")
 )

@@ -27,6 +27,8 @@ from glider_stream.roadmap.provenance import provenance_of
 from glider_stream.roadmap.roadmap import Edges, in_order
 from glider_stream.roadmap.store import read_part, read_roadmap
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):

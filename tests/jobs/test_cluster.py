@@ -13,7 +13,8 @@ from glider_stream.jobs import cluster
 from glider_stream.jobs.build import Job, build_file
 
 pytest.importorskip("distributed")
-pytestmark = pytest.mark.filterwarnings("ignore")  # what dask says while its workers die is its own
+# what dask says while its workers die is its own
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 
 
 @pytest.fixture

@@ -10,7 +10,8 @@ from glider_stream.jobs.build import Job, build_file
 from glider_stream.roadmap.builder import find_edges
 
 distributed = pytest.importorskip("distributed")
-pytestmark = pytest.mark.filterwarnings("ignore")  # what dask says while it ends is its own
+# what dask says while it ends is its own
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 
 
 @pytest.fixture

@@ -20,6 +20,8 @@ from glider_stream.roadmap import store
 from glider_stream.roadmap.roadmap import Edges, by_node, in_order
 from glider_stream.roadmap.store import read_roadmap
 
+pytestmark = pytest.mark.slow
+
 NODES = 77
 KEEP = np.arange(NODES) % 3 != 1
 OTHER = np.arange(NODES) < 40

@@ -12,6 +12,8 @@ from glider_stream.base.errors import InputError
 from glider_stream.jobs.reuse import untouched
 from glider_stream.scenario import read_scenario
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("xarray")
 
 LAWS = {

@@ -68,6 +68,7 @@ def check_errors(away):
     assert 0.6 < np.sqrt((away**2).mean()) < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "columns", [SPEEDS, ("vertical_speed", "glide_angle_deg"), ("vertical_speed", "pitch_deg")]
 )
@@ -87,6 +88,7 @@ def test_the_buoyancy_is_found_again(tmp_path, columns):
     assert exact.glider.dive_volume == pytest.approx(exact.parameters["buoyancy"].value, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_drag_induced_drag_and_lift_are_found_again_where_pitch_and_buoyancy_are_told(tmp_path):
     truth = {"drag_0": 10.0, "drag_alpha2": 400.0, "lift_alpha": 450.0}
     away = {name: [] for name in truth}
@@ -180,6 +182,7 @@ def test_real_dives_lie_within_the_uncertainty_shown(preset):
     assert np.degrees(-angle).max() <= high
 
 
+@pytest.mark.slow
 @real
 def test_a_real_dive_lies_within_what_the_others_say_of_it(tmp_path):
     header, *rows = CSV.read_text().splitlines()

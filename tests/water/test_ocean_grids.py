@@ -560,6 +560,7 @@ def test_a_user_may_say(tmp_path, make, names):
     )
 
 
+@pytest.mark.slow
 def test_describe_takes_a_users_word(tmp_path):
     path = written(tmp_path, plain())
     program = [sys.executable, "-c", "from glider_stream.cli import main; main()"]

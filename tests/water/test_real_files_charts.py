@@ -238,6 +238,7 @@ kind = "time"
 """
 
 
+@pytest.mark.slow
 def test_a_figure_draws_the_ground_and_no_clearance(tmp_path):
     """The chart's own depth, whatever the clearance, the keep-out, and where the levels of the currents end."""
     lon, lat = np.arange(17.5, 18.51, 0.1), np.arange(37.5, 38.51, 0.1)

@@ -484,6 +484,7 @@ def test_other_formats_name_the_tool_that_converts_them(tmp_path, name):
         read_currents(tmp_path / "all.zip")
 
 
+@pytest.mark.slow
 def test_an_error_of_our_own_is_no_damage_of_the_file(tmp_path):
     """Exit code 3, one line, and the trace where it is asked for; a truncated file is still exit code 2."""
     path = written(tmp_path, dataset())

@@ -244,6 +244,7 @@ def ways_of_all_legs(problem, road, spacing=10.0):
     return np.concatenate(rows)
 
 
+@pytest.mark.slow
 def test_no_leg_touches_what_the_files_close(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written(tmp_path, chart())
