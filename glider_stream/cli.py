@@ -221,28 +221,28 @@ def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @ROADMAP
 @ELSEWHERE
 @route_options
-def query(roadmap: Path, overrides: tuple[str, ...], **asked: Any) -> None:
+def query(roadmap: Path, overrides: tuple[str, ...], **options: Any) -> None:
     """Find the cheapest path in ROADMAP.
 
     It leads from --start to --goal; without these, between the scenario's own points.
     """
     from .opened import open
 
-    _answer(lambda: open(roadmap, overrides), **asked)
+    _answer(lambda: open(roadmap, overrides), **options)
 
 
 @cli.command()
 @click.argument("scenario")
 @route_options
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
+def plan(scenario: str, overrides: tuple[str, ...], **options: Any) -> None:
     """Find a route of SCENARIO without a roadmap.
 
     SCENARIO is a TOML file or the name of a shipped scenario. Each leg leaves when the last one arrives.
     """
     from .opened import open_scenario
 
-    _answer(lambda: open_scenario(scenario, overrides), **asked)
+    _answer(lambda: open_scenario(scenario, overrides), **options)
 
 
 def _check_together(front: bool, departures: bool, alone: bool, spacing: bool) -> None:
@@ -298,8 +298,8 @@ def _answer(
     departures = depart_between is not None or arrive_by is not None
     answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
-    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    alone = not (outputs or polish or asked or as_card) and most_energy is None and thin is None
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    alone = not (outputs or polish or options or as_card) and most_energy is None and thin is None
     spacing = every is not None or figure is not None
     _check_together(front, departures, alone, spacing)
     if front:
@@ -313,8 +313,8 @@ def _answer(
         for output in outputs:
             check_export(output)
         source = opened()
-        asked |= {"most_energy": most_energy, "polish": polish, "thin": thin, "surfacing": rule}
-        path = source.query(start, goal, outputs=outputs, **asked)
+        options |= {"most_energy": most_energy, "polish": polish, "thin": thin, "surfacing": rule}
+        path = source.query(start, goal, outputs=outputs, **options)
         for note in path.notes:
             say(f"note: {note}", error=True)
         answer, found = source.card(path) if as_card and path.found else path, path.found
@@ -551,8 +551,8 @@ def bench(
     from . import planner
 
     if suite:
-        alien = {"--runs": runs, "--ceiling": ceiling, "--against": against}
-        for name, value in alien.items():
+        unusable = {"--runs": runs, "--ceiling": ceiling, "--against": against}
+        for name, value in unusable.items():
             if value is not None:
                 raise click.UsageError(f"{name} does not go with --suite; leave one of them out")
         report = planner.suite(

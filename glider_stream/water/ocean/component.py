@@ -446,7 +446,7 @@ class Component:
         require(
             shape == (ny, nx),
             f"`{field.name}` in {self.file} has {shape[0]} x {shape[1]} points, `{self.name}` {ny} x {nx}: "
-            "they do not fit",
+            "they do not fit; give the grid file of the same model",
         )
         return values
 
