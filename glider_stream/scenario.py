@@ -269,15 +269,18 @@ class Scenario:
             "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
         )
         assert isinstance(self.domain, GeographicDomain)
-        domain, frame, asked = self.domain, self.domain.frame(), self.terrain
-        if asked.bathymetry is not None:
+        domain, frame, settings = self.domain, self.domain.frame(), self.terrain
+        if settings.bathymetry is not None:
             from .water.ocean.bathymetry import read_bathymetry
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
-            text = asked.variable, asked.positive, asked.names
-            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *text)]
-        return raster_terrain(asked, frame, *box, bottoms, domain.box())
+            text = settings.variable, settings.positive, settings.names
+            bottoms = [
+                *bottoms,
+                read_bathymetry(settings.bathymetry, frame, domain.lon, domain.lat, stray, *text),
+            ]
+        return raster_terrain(settings, frame, *box, bottoms, domain.box())
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -315,7 +318,7 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         # some editors write a byte order mark at the start
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise InputError(f"the scenario {name} cannot be read: {error.strerror}") from None
+        raise InputError(f"the scenario {name} cannot be read: {error.strerror}; name another") from None
     except UnicodeDecodeError as error:
         raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as UTF-8") from None
     except (ValueError, RecursionError) as error:
