@@ -11,10 +11,10 @@ from ..kernels.edges import CONNECTED, Edge
 from .problem import Problem
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 
-SAMPLED_NODES, SAMPLED_LEGS = 8, 64
+SAMPLED_NODES, SAMPLED_LEGS = 16, 512
 """The legs that are flown again: some of each of a few nodes, evenly chosen by their numbers."""
 MOST_SAMPLED_NODES = 128
-"""Where few legs leave those nodes, up to so many are asked for theirs; more would cost each part of a build much."""
+"""Where few legs leave those nodes, up to so many are asked for theirs; more would cost each part much."""
 FINER = 0.381966
 """The finer step, in steps: near a half, but no simple fraction. A flow that repeats itself every step, or every
 half one, would look the same in half steps."""
@@ -47,7 +47,7 @@ class StepError:
         if self.legs == 0:
             return f"of {self.dt:g} s, {UNTRIED}"
         legs = "1 leg" if self.legs == 1 else f"{self.legs} legs"
-        return f"of {self.dt:g} s, off by {self.off:.2g} m at most ({legs}, flown again in finer steps)"
+        return f"of {self.dt:g} s, off by {self.off:.2g} m at most of {legs} that were flown again in finer steps"
 
 
 def sampled_nodes(count: int, few: int = SAMPLED_NODES) -> Index:

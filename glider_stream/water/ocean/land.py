@@ -15,13 +15,13 @@ from .names import Names, standard_name
 Values = NDArray[np.float32]
 
 NO_DATA = 1e3
-"""No unit of a current makes such a number: a fill that the file does not declare."""
+"""No current of a few m/s makes such a number, in cm/s or larger units: a fill that the file does not declare."""
 FASTEST = 9.0
 """No ocean current is as fast [m/s]: a fill, or another unit."""
 ALONE = 2
 """So many neighbouring points of exactly 0 m/s are calm, as a radar measures it; more are written so."""
 SEA_IS_ONE = re.compile(
-    r"^([tuv]mask(util)?|mask_(rho|u|v|t)|wet(_[cuvt])?|sea_binary_mask|sea_mask)$", re.IGNORECASE
+    r"^([tuv]mask(util)?|(wetdry_)?mask_(rho|u|v|t)|wet(_[cuvt])?|sea_binary_mask|sea_mask)$", re.IGNORECASE
 )
 LAND_IS_ONE = re.compile(r"^(land_binary_mask|land_mask|landmask)$", re.IGNORECASE)
 EITHER = re.compile(r"^(mask|lsm|land_sea_mask|landsea|binary_mask)$", re.IGNORECASE)
@@ -38,6 +38,8 @@ def mask_of(name: str, data: Any, said: Names, variable: Any, component: str) ->
         there = said.mask in data.variables
         require(there, f'{name} holds no mask `{said.mask}`; name one of it, or "none", in `names`')
     names = [said.mask] if said.mask else [str(n) for n in data.variables if _is_mask(str(n), data[n], component)]
+    # what falls dry with the tide is land then; there the model leaves the last current that it had
+    names.sort(key=lambda one: not one.lower().startswith("wetdry_"))
     for one in (data[n] for n in names):
         extra = [dim for dim in one.dims if dim not in variable.dims]
         fits = len(one.dims) - len(extra) >= 2 and all(one.sizes[dim] == 1 for dim in extra)
@@ -78,7 +80,8 @@ def _on_land(mask: Any, variable: Any) -> float | None:
 
 def clear_marks(file: str, name: str, values: Values, factor: float | None) -> tuple[Values, tuple[str, ...]]:
     """In m/s, NaN where there is no data; what was found."""
-    values = np.where(np.abs(values) > NO_DATA, np.float32(np.nan), values)
+    # of mm/s or m/day a current may well have thousands
+    values = np.where(np.abs(values) > max(NO_DATA, FASTEST / (factor or 1.0)), np.float32(np.nan), values)
     values *= np.float32(factor or 1.0)
     beyond = np.abs(values) > FASTEST
     if not beyond.any():

@@ -1,6 +1,8 @@
 """Opening ocean files, which are untrusted: NetCDF of either kind and Zarr, by xarray."""
 
+import errno
 import json
+import os
 import re
 import traceback
 import warnings
@@ -51,6 +53,8 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
     import cf_xarray  # noqa: F401  (registers the accessor)
     import xarray
 
+    address = re.match(r"[a-z][\w+.-]+:{1,2}/", str(path)) is not None and not path.exists()
+    require(not address, f"{path} is an address: download the file, and name it where it is then")
     require(path.exists(), f"the file {path} does not exist")
     check_file(path, "the file")
     engine, more = _engine(path)
@@ -82,7 +86,22 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
             raise
 
 
+DISK = {
+    getattr(errno, name)
+    for name in ("ESTALE", "EIO", "ETIMEDOUT", "ENOTCONN", "EHOSTDOWN", "EREMOTEIO", "ENXIO")
+    if hasattr(errno, name)
+}
+"""Errors of a disk or of a network's file system, which say nothing of the file."""
+
+
 def _damaged(path: Path, error: Exception) -> InputError:
+    said = re.search(r"errno = (\d+)", str(error))
+    number = int(said[1]) if said else getattr(error, "errno", None)
+    if number in DISK:
+        return InputError(
+            f"{path.name} cannot be read: {os.strerror(number).lower()}; look to its disk or network, then give "
+            "the same command again"
+        )
     what = str(error).splitlines()[0] if str(error) else type(error).__name__
     return InputError(f"{path.name} cannot be read; it may be truncated or damaged: {what}")
 
