@@ -19,7 +19,6 @@ from .inputs import inputs_of, names_of
 from .problem import Problem
 from .roadmap import Provenance, Roadmap
 
-
 _version = cache(version)
 """Versions of packages, which are read from files."""
 

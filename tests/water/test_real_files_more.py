@@ -158,3 +158,14 @@ def test_a_disk_that_fails_is_no_damage_of_the_file(tmp_path, error):
     assert said.startswith(
         "currents.nc cannot be read: stale file handle; look to its disk or network, then give"
     )
+
+
+def test_zeros_below_the_models_depth_do_not_slow_the_water_above(tmp_path):
+    data = both(dataset(), lambda one: one.where(one.depth < 60.0, 0.0))
+    data["deptho"] = (("lat", "lon"), np.full((LAT.size, LON.size), 60.0), {"units": "m"})
+    file = read_currents(written(tmp_path, data))
+    at_level = current(20.5, 60.5, 50.0)
+    assert sample(file, 20.5, 60.5, 58.0) == pytest.approx(at_level, abs=1e-3)
+    assert sample(file, 20.5, 60.5, 62.0) is None
+    calm = read_currents(tmp_path / "currents.nc", {"zeros": "calm"})
+    assert sample(calm, 20.5, 60.5, 58.0) == pytest.approx([0.6 * part for part in at_level], abs=1e-3)
