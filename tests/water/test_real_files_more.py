@@ -8,7 +8,9 @@ import pytest
 from helpers.currents import LAT, LON, both, current, dataset, written
 
 from glider_stream.base.errors import InputError
-from glider_stream.water.ocean import opening, read_currents, sample
+from glider_stream.water.frame import LocalFrame
+from glider_stream.water.ocean import grib, opening, read_currents, sample
+from glider_stream.water.ocean.bathymetry import read_bathymetry
 
 xr = pytest.importorskip("xarray")
 
@@ -169,3 +171,57 @@ def test_zeros_below_the_models_depth_do_not_slow_the_water_above(tmp_path):
     assert sample(file, 20.5, 60.5, 62.0) is None
     calm = read_currents(tmp_path / "currents.nc", {"zeros": "calm"})
     assert sample(calm, 20.5, 60.5, 58.0) == pytest.approx([0.6 * part for part in at_level], abs=1e-3)
+
+
+def messages(surface, below):
+    """What cfgrib makes of GRIB messages, whose parameter it has no name for; by their keys."""
+    data = dataset(depth=[0.0, 50.0, 100.0])
+    number = {2: "uo", 3: "vo"}
+
+    def opened(path, keys):
+        if not keys:
+            return xr.Dataset()
+        if keys.get("edition") == 1 or keys["parameterNumber"] not in number:
+            return xr.Dataset()
+        one = data[number[keys["parameterNumber"]]].assign_attrs(units="unknown", standard_name="unknown")
+        parts = {
+            "oceanSurface": one.isel(depth=0, drop=True).assign_coords(oceanSurface=0.0),
+            "depthBelowSea": one.isel(depth=slice(1, None)).rename(depth="depthBelowSea"),
+        }
+        kinds = [kind for kind, there in (("oceanSurface", surface), ("depthBelowSea", below)) if there]
+        if len(kinds) > 1 and "typeOfLevel" not in keys:
+            raise ValueError("multiple values for unique key")
+        return parts[keys.get("typeOfLevel", kinds[0])].to_dataset(name="unknown")
+
+    return opened
+
+
+def test_grib_messages_are_told_by_their_numbers(tmp_path, monkeypatch):
+    for surface, below in ((True, True), (False, True), (True, False)):
+        monkeypatch.setattr(grib, "_opened", messages(surface, below))
+        found = grib.open_grib(tmp_path / "currents.grb2")
+        file = read_currents(written(tmp_path, found, f"{surface}{below}.nc"))
+        deep = below and current(20.45, 60.45, 75.0)
+        assert sample(file, 20.45, 60.45, 75.0) == pytest.approx(deep or current(20.45, 60.45), abs=1e-3)
+        if surface and below:
+            assert sample(file, 20.45, 60.45, 20.0) == pytest.approx(current(20.45, 60.45, 20.0), abs=1e-3)
+            assert list(file.depth) == [0.0, 50.0, 100.0]
+    monkeypatch.setattr(grib, "_opened", lambda path, keys: xr.Dataset())
+    assert not grib.open_grib(tmp_path / "waves.grb2").data_vars
+
+
+def test_the_only_band_of_a_picture_is_a_chart_once_its_sense_is_told(tmp_path):
+    lon, _ = np.meshgrid(LON, LAT)
+    chart = xr.Dataset(
+        {"band_data": (("band", "lat", "lon"), (-500.0 - 100 * (lon - 20.5))[None])},
+        {
+            "band": [1],
+            "lat": ("lat", LAT, {"units": "degrees_north"}),
+            "lon": ("lon", LON, {"units": "degrees_east"}),
+        },
+    )
+    path, frame = written(tmp_path, chart, "chart.nc"), LocalFrame(20.5, 60.5)
+    with pytest.raises(InputError, match="does not say whether it counts up or down: name `positive`"):
+        read_bathymetry(path, frame, (20.4, 20.6), (60.4, 60.6))
+    bottom = read_bathymetry(path, frame, (20.4, 20.6), (60.4, 60.6), positive="up")
+    assert bottom.height == pytest.approx(-500.0 - 100 * (bottom.grid.mesh()[0] - 20.5))

@@ -82,6 +82,10 @@ def read_bathymetry(
         return _read(path.name, data, frame, lon, lat, beyond, asked)
 
 
+ONLY_BAND = "band_data"
+"""What a GeoTIFF's band is called: whether it counts up or down is for the user to say."""
+
+
 def _pick(name: str, data: Any, variable: str | None) -> Any:
     if variable is not None:
         require(
@@ -102,6 +106,8 @@ def _pick(name: str, data: Any, variable: str | None) -> Any:
             not hits,
             f"{name} holds {len(hits)} bathymetries, {listing(one.name for one in hits)}: name `variable`",
         )
+    if [one.name for one in fields] == [ONLY_BAND]:
+        return fields[0]
     raise InputError(
         f"{name} holds no bathymetry that can be told by its name; name `variable`, of: {listing(data.data_vars)}"
     )

@@ -16,6 +16,7 @@ from typing import Any
 from ...base.errors import InputError
 from ...base.settings import require
 from ...base.untrusted import check_claim, check_file, check_links, groups_of
+from .grib import open_grib
 
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How TIFF files begin."""
@@ -65,7 +66,12 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
         with warnings.catch_warnings():
             # of the packages that read, and of stale attributes of good data: several fill values, odd calendars
             warnings.simplefilter("ignore")
-            data = xarray.open_dataset(path, engine=engine, decode_times=False, cache=False, **more)
+            if engine == "cfgrib":
+                data = open_grib(path)
+            else:
+                data = xarray.open_dataset(path, engine=engine, decode_times=False, cache=False, **more)
+            if engine == "rasterio":
+                data = data.rio.write_coordinate_system()
     except InputError:
         raise
     except Exception as error:
@@ -97,7 +103,7 @@ DISK = {
 def _damaged(path: Path, error: Exception) -> InputError:
     said = re.search(r"errno = (\d+)", str(error))
     number = int(said[1]) if said else getattr(error, "errno", None)
-    if number in DISK:
+    if isinstance(number, int) and number in DISK:
         return InputError(
             f"{path.name} cannot be read: {os.strerror(number).lower()}; look to its disk or network, then give "
             "the same command again"
@@ -180,7 +186,7 @@ def _engine(path: Path) -> tuple[str, dict[str, Any]]:
     if head[:4] in (b"CDF\x01", b"CDF\x02"):
         return "scipy", {}
     if head[:4] == b"GRIB" and find_spec("cfgrib") is not None:
-        return "cfgrib", {"backend_kwargs": {"indexpath": ""}}
+        return "cfgrib", {}
     if head[:4] in TIFF and find_spec("rioxarray") is not None:
         return "rasterio", {}
     for mark, what in OTHER_KINDS.items():
