@@ -11,6 +11,7 @@ from xml.etree import ElementTree as Xml
 
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.untrusted import check_file
 from .route_columns import HEIGHTS, NotARoute, column_of, csv_points, depth_of, refuse_unknown, told_height
 from .route_maps import OURS, Mark, gpx_points, kml_points, route_of
 from .seaglider import target_points
@@ -52,6 +53,7 @@ def read_drawn(file: str | Path) -> Drawn:
     InputError where there is no point, more than one line, a number that nobody knows, or another file.
     """
     path = Path(file)
+    check_file(path, "the route")
     require(path.is_file(), f"the route {path} does not exist; name a file")
     form = "targets" if path.name.lower() == "targets" else path.suffix.lower()
     known, got = ", ".join(FORMS), repr(form or "no ending")
