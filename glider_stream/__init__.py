@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .roadmap.builder import build_roadmap
     from .roadmap.problem import Problem
     from .roadmap.roadmap import Roadmap
+    from .roadmap.slices import SlicedRoadmap
     from .roadmap.store import read_roadmap, write_roadmap
     from .scenario import Scenario, read_scenario, shipped_scenarios
     from .search.path import Leg, Path
@@ -37,6 +38,7 @@ __all__ = [
     "Problem",
     "Roadmap",
     "Scenario",
+    "SlicedRoadmap",
     "Status",
     "Surfacing",
     "__version__",
@@ -55,16 +57,19 @@ _HOMES = {
     "roadmap.builder": ("build_roadmap",),
     "roadmap.problem": ("Problem",),
     "roadmap.roadmap": ("Roadmap",),
+    "roadmap.slices": ("SlicedRoadmap",),
     "roadmap.store": ("read_roadmap", "write_roadmap"),
     "scenario": ("Scenario", "read_scenario", "shipped_scenarios"),
     "search.path": ("Leg", "Path"),
     "search.query": ("Planner",),
     "search.surfacing": ("Surfacing",),
 }
-"""Where each name lives. It is loaded when it is first asked for: a start costs only what is used."""
+"""The module of each name. A name is loaded when it is first used, so that the start costs little."""
 _WHERE = {name: home for home, names in _HOMES.items() for name in names}
 
-if not TYPE_CHECKING:  # a type checker reads the imports above, and would take this for "any name, of any type"
+if (
+    not TYPE_CHECKING
+):  # a type checker reads the imports above; this function would tell it "any name, of any type"
 
     def __getattr__(name):
         if name == "__version__":

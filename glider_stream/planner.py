@@ -19,12 +19,14 @@ from .pilot.lint import lint as lint_file
 from .pilot.score import Score
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
-from .roadmap.builder import Progress, build_roadmap, node_positions
+from .roadmap.builder import Progress, build_roadmap, build_slices, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
-from .roadmap.store import read_roadmap
+from .roadmap.slices import SlicedRoadmap
+from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario
+from .search.departures import Moment
 from .search.path import Path
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
@@ -40,8 +42,8 @@ if TYPE_CHECKING:
     from .water.describe import Description, Place
     from .water.ocean import Names
 
-AnyRoadmap = str | File | Roadmap | OpenedRoadmap
-"""A roadmap file's name, a roadmap, or an opened one, which keeps what questions need."""
+AnyRoadmap = str | File | Roadmap | SlicedRoadmap | OpenedRoadmap
+"""A roadmap: the name of its file, an object, or an opened one, which keeps what queries need."""
 
 
 def build(
@@ -53,15 +55,15 @@ def build(
     restart: bool = False,
     checkpoint: float | None = None,
     scheduler: str | None = None,
-    base: str | File | Roadmap | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
-) -> Roadmap:
-    """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says.
+) -> Roadmap | SlicedRoadmap:
+    """Build the roadmap of a scenario (a file, a shipped name or an object), and write it to `output`.
 
-    A build into a file goes on where an earlier one of the same was stopped, or begins anew with `restart`;
-    every `checkpoint` [s], 30 if None, the disk is asked to keep what was found. `scheduler` is the address
-    of a Dask scheduler, or "local:N", whose workers evaluate; `base` an older roadmap of the same nodes in
-    another current, of which what that cannot have touched is taken over.
+    A build into a file continues an earlier one that was stopped; `restart` begins again. Every `checkpoint` [s]
+    (None: 30) the disk is asked to keep what was found. `scheduler`: the address of a Dask scheduler, or
+    "local:N", whose workers evaluate the nodes. `base`: an older roadmap of the same nodes in another current;
+    edges that the change cannot affect are taken from it.
 
     Examples:
         >>> road = planner.build("small.toml", "built.h5", overrides=["neighbours.k=10"])
@@ -73,9 +75,11 @@ def build(
         file = {"restart": restart, "checkpoint": checkpoint, "scheduler": scheduler, "base": base}
         given = [name for name, value in file.items() if value not in (None, False)]
         require(not given, f"{', '.join(given)} need an output file; name one")
-        return build_roadmap(resolved.problem(), threads, progress)
+        problem = resolved.problem()
+        make = build_roadmap if len(problem.departures) == 1 else build_slices
+        return make(problem, threads, progress)
     _build(resolved, output, threads, progress, None, restart, checkpoint, scheduler, base)
-    return read_roadmap(output)
+    return read_any_roadmap(output)
 
 
 def build_part(
@@ -88,7 +92,7 @@ def build_part(
     restart: bool = False,
     checkpoint: float | None = None,
     scheduler: str | None = None,
-    base: str | File | Roadmap | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> None:
     """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; see `build` for the rest.
@@ -112,7 +116,7 @@ def _build(
     restart: bool,
     checkpoint: float | None,
     address: str | None,
-    older: str | File | Roadmap | None,
+    older: str | File | Roadmap | SlicedRoadmap | None,
 ) -> None:
     job: dict[str, Any] = {"restart": restart, "shard": None if shard is None else shard_of(shard)}
     if checkpoint is not None:
@@ -136,7 +140,7 @@ def _build(
 
 
 def _resolved(scenario: str | File | Scenario, output: str | File | None, overrides: Sequence[str]) -> Scenario:
-    """The scenario to build, once it is known that its output can be written."""
+    """Return the scenario to build, after a check that its output can be written."""
     if output is not None:
         check_output(output)
     if isinstance(scenario, Scenario):
@@ -147,8 +151,8 @@ def _resolved(scenario: str | File | Scenario, output: str | File | None, overri
     return read_scenario(scenario, overrides)
 
 
-def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
-    """Make one roadmap of parts that `build_part` wrote.
+def merge(parts: Sequence[str | File], output: str | File) -> Roadmap | SlicedRoadmap:
+    """Merge the parts that `build_part` wrote into one roadmap.
 
     Examples:
         >>> for shard in ("1/2", "2/2"):
@@ -158,11 +162,11 @@ def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
         True
     """
     merge_parts(parts, output)
-    return read_roadmap(output)
+    return read_any_roadmap(output)
 
 
-def info(roadmap: AnyRoadmap) -> Roadmap:
-    """A roadmap from its file, which can be printed.
+def info(roadmap: AnyRoadmap) -> Roadmap | SlicedRoadmap:
+    """Return a roadmap from its file; `print` shows it.
 
     Examples:
         >>> print(planner.info("small.h5"))  # doctest: +ELLIPSIS
@@ -173,7 +177,7 @@ def info(roadmap: AnyRoadmap) -> Roadmap:
 
 
 def differ(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
-    """The differences between two roadmaps, which can be printed.
+    """Return the differences between two roadmaps; `print` shows them.
 
     Examples:
         >>> fewer = planner.build("small.toml", overrides=["neighbours.k=10"])
@@ -195,10 +199,11 @@ def query(
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
     polish: bool = False,
+    depart: Moment | None = None,
 ) -> Path:
-    """The cheapest path between two points, see `OpenedRoadmap.query`.
+    """Return the cheapest path between two points; see `OpenedRoadmap.query`.
 
-    For several questions open the roadmap once: `glider_stream.open`.
+    For several queries open the roadmap once: `glider_stream.open`.
 
     Examples:
         >>> path = planner.query("small.h5", goal=(100, -100, -75), outputs=["path.json", "path.csv"])
@@ -210,6 +215,7 @@ def query(
     return open_roadmap(roadmap).query(
         start,
         goal,
+        depart=depart,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
@@ -233,8 +239,9 @@ def plan(
     *,
     overrides: Sequence[str] = (),
     polish: bool = False,
+    depart: Moment | None = None,
 ) -> Path:
-    """The cheapest path of a scenario without a roadmap; all else as in `query`.
+    """Return the cheapest path of a scenario, without a roadmap; see `OpenedRoadmap.query`.
 
     Examples:
         >>> path = planner.plan("small.toml", (-190, 190, 0), (100, -100, -75))
@@ -246,6 +253,7 @@ def plan(
     return open_scenario(scenario, overrides).query(
         start,
         goal,
+        depart=depart,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
@@ -261,7 +269,7 @@ def trade_off(
     goal: Point | None = None,
     surfacing: Surfacing | None = None,
 ) -> TradeOff:
-    """Every path of one query that no other beats both in time and in energy; all else as in `query`.
+    """Return all paths of one query that no other path beats in both time and energy; see `query`.
 
     Examples:
         >>> road = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
@@ -272,7 +280,7 @@ def trade_off(
 
 
 def card(roadmap: AnyRoadmap, path: Path) -> Card:
-    """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+    """Return the card of a route of this roadmap: speed over ground and currents, leg by leg.
 
     Examples:
         >>> path = planner.query("small.h5")
@@ -285,7 +293,7 @@ def card(roadmap: AnyRoadmap, path: Path) -> Card:
 def score(
     roadmap: AnyRoadmap | Scenario, route: str | File | Sequence[str | File], start: Point | None = None
 ) -> Score:
-    r"""Fly a drawn route, from one file or several, in a roadmap's water, as `OpenedRoadmap.score` has it.
+    r"""Return the score of a drawn route (one file or several) in a roadmap's water; see `OpenedRoadmap.score`.
 
     Examples:
         >>> _ = pathlib.Path("drawn.csv").write_text("x,y,z\n-190,190,0\n-100,100,-75\n0,0,-150\n")
@@ -298,7 +306,7 @@ def score(
 
 
 def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
-    r"""What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets.
+    r"""Return the faults of vehicles' files: goto lists (of at most `most_waypoints`), yo files and targets.
 
     Examples:
         >>> _ = pathlib.Path("goto_l10.ma").write_text("behavior_name=goto_list\n")
@@ -310,7 +318,7 @@ def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> l
 
 
 def why_no_edges(roadmap: AnyRoadmap) -> str:
-    """The reason, in a sentence, if a roadmap has no edge; empty if it has some.
+    """Return the reason, in one sentence, if a roadmap has no edge; empty if it has edges.
 
     Examples:
         >>> planner.why_no_edges("small.h5")
@@ -320,9 +328,9 @@ def why_no_edges(roadmap: AnyRoadmap) -> str:
 
 
 def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":
-    """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too.
+    """Fly the legs of a roadmap file again, and a `sample` of them (0: all) by another integrator.
 
-    `overrides` as `glider_stream.open` has them.
+    `overrides`: see `glider_stream.open`.
 
     Examples:
         >>> planner.verify("small.h5", sample=5).holds
@@ -334,9 +342,9 @@ def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] =
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where no path exists.
+    """Return the costs [s] of the cheapest paths from n points to m others: (n, m), inf where no path exists.
 
-    Points are given in the coordinates of the scenario's domain; see `query`.
+    Points are in the coordinates of the scenario's domain; see `query`.
 
     Examples:
         >>> planner.table("small.h5", [(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
@@ -355,7 +363,7 @@ def plot(
     fronts: float | None = None,
     overrides: Sequence[str] = (),
 ) -> "Figure | None":
-    """Draw a path over its roadmap or scenario, or the roadmap, as `OpenedRoadmap.plot` has it.
+    """Draw a path over its roadmap or scenario, or a roadmap; see `OpenedRoadmap.plot`.
 
     Examples:
         >>> path = planner.query("small.h5")
@@ -395,7 +403,7 @@ def plot_steering(
 ) -> "Figure":
     """Draw how legs are found from one point: its flow map at the goal's depth, and what each method finds.
 
-    Points are in the coordinates of the scenario's domain; any method may be chosen there.
+    Points are in the coordinates of the scenario's domain. The scenario may have any steering method.
 
     Examples:
         >>> figure = planner.plot_steering("small.toml", (-190, 190, 0), (0, 0, -150), "steering.png")
@@ -409,7 +417,10 @@ def plot_steering(
     ends = [resolved.domain.point(end) for end in (start, goal)]
     for end, name in zip(ends, ("start", "goal"), strict=True):
         problem.check_point(end, name)
-    require(ends[0][2] != ends[1][2], "start and goal lie at the same depth; a leg changes it")
+    require(
+        ends[0][2] != ends[1][2],
+        "start and goal lie at the same depth; give another depth, because a leg changes its depth",
+    )
     figure = plot_steering(problem, node_positions(problem), ends[0], ends[1])
     if output is not None:
         save_figure(figure, output)
@@ -421,10 +432,10 @@ def describe(
     at: Sequence["Place"] = (),
     names: "Names | Mapping[str, Any] | None" = None,
 ) -> "Description":
-    """What current files hold, and what the planner takes for what; the current at places `at`.
+    """Return what current files hold, how the planner reads them, and the current at places `at`.
 
-    A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None where there is but one.
-    `names` says what the files do not. InputError where they cannot be used.
+    A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None if there is only one time.
+    `names`: settings for what the files do not hold. InputError if they cannot be used.
 
     Examples:
         >>> description = planner.describe("currents.nc", at=[(18.5, 38.0, 100.0, None)])
@@ -446,7 +457,7 @@ def calibrate(
     preset: str = "seaglider",
     columns: Mapping[str, str] | None = None,
 ) -> "Calibration":
-    """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says.
+    """Return a preset fitted to the dives of a CSV file; its [glider] section is written to `output`.
 
     Examples:
         >>> calibration = planner.calibrate("dives.csv", "glider.toml")
@@ -475,11 +486,11 @@ def bench(
     ceiling: str | File | None = None,
     progress: "Callable[[benchmarks.Figure], None]" = lambda figure: None,
 ) -> "tuple[benchmarks.Record, list[str]]":
-    """Measure what this machine does: the record, and what has moved since the record `against`.
+    """Measure this machine: return the record, and what has changed since the record `against`.
 
-    The parts named in `only`, all if none, each figure `runs` times; `quick` measures small problems, to see
-    that all of it runs. `ceiling` is a program that the raw integrator is measured in turns with. Written as
-    JSON where `output` says.
+    `only`: the parts to measure (empty: all); each figure is measured `runs` times. `quick`: small problems, to
+    check that everything runs. `ceiling`: a program that takes turns with the raw integrator. The record is
+    written to `output` as JSON.
 
     Examples:
         >>> record, moved = planner.bench("record.json", runs=1, quick=True, only=["integrator"])
@@ -506,10 +517,10 @@ def suite(
     pairs: int = 20,
     progress: Callable[[str], None] = lambda message: None,
 ) -> "Report":
-    """Solve the suite's named problems, `only` some of them, by every method and baseline.
+    """Return the report on the suite's problems (`only`: some of them), solved by every method and baseline.
 
-    `pairs` random queries each; `quick`: few of all. Written as JSON where `output` says; a log per problem,
-    as OMPL's tools read them, into the folder `ompl`.
+    `pairs`: random queries for each. `quick`: a small run. The report is written to `output` as JSON, and a log
+    for each problem, which OMPL's tools read, into the folder `ompl`.
 
     Examples:
         >>> planner.suite(only=["atlantis"])  # doctest: +ELLIPSIS

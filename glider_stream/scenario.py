@@ -1,5 +1,6 @@
-"""Scenarios: TOML into objects, every key checked; the problem that they make."""
+"""Scenarios: makes objects from TOML, checks every key, and builds the problem."""
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -23,6 +24,7 @@ from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
+from .roadmap.slices import SlicedRoadmap
 from .roadmap.steering import METHODS, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
@@ -47,13 +49,15 @@ SECTIONS = (
     "integration",
     "cost",
     "query",
+    "departures",
 )
-OPTIONAL = ("terrain", "query")
+OPTIONAL = ("terrain", "query", "departures")
 
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
+MOST_SLICES = 10_000
 FILES = {key for keys in KEYS.values() for key in keys}
-"""Keys whose values name files."""
+"""The keys whose values are names of files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
     "sampling": ("kind", SAMPLERS),
@@ -61,17 +65,17 @@ KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "steering": ("method", METHODS),
     "cost": ("kind", COSTS),
 }
-"""The sections that come in kinds: the key that selects, and its choices."""
+"""The sections with several kinds: the key that selects the kind, and its choices."""
 
 
 @dataclass(frozen=True)
 class QueryPoints:
-    """`start` and `goal` in the domain's coordinates; a route leaves at `departure` [s].
+    """The query: `start` and `goal` in the domain's coordinates; a route leaves at `departure` [s].
 
-    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule. In a flow that changes
-    each leg leaves when the last one arrives, but for `frozen`: then all meet the current of the departure.
-    `bins` [s]: ways to a node that arrive in different bins of time are kept side by side, where leaving later
-    may arrive earlier.
+    `most_yos` and `most_hours`: the most yos and hours from one surfacing to the next, or None. In a flow that
+    changes, each leg leaves when the last one arrives. With `frozen` all legs meet the current of the departure.
+    `bins` [s]: paths to a node that arrive in different bins of time are kept side by side, since a later
+    departure may arrive earlier.
     """
 
     start: Point
@@ -84,14 +88,45 @@ class QueryPoints:
 
     def __post_init__(self) -> None:
         fits = self.bins is None or 0 < self.bins <= LONGEST
-        require(fits, f"`query.bins` must be above 0 s, {LONGEST:g} at most; got {self.bins}")
+        require(fits, f"`query.bins` must be above 0 s and at most {LONGEST:g} s; got {self.bins}")
         fits = abs(self.departure) <= LONGEST
         require(fits, f"`query.departure` must be within {LONGEST:g} s of 0; got {self.departure:g}")
 
 
 @dataclass(frozen=True)
+class Departures:
+    """The departures of a roadmap's slices [s]: the `first`, one `every` so many seconds after it, the `last`."""
+
+    first: float
+    last: float
+    every: float
+
+    def __post_init__(self) -> None:
+        for name in ("first", "last"):
+            value = getattr(self, name)
+            fits = abs(value) <= LONGEST
+            require(fits, f"`departures.{name}` must be within {LONGEST:g} s of 0; got {value:g}")
+        rises = self.first <= self.last
+        require(rises, f"`departures.last` must not be before `first`, {self.first:g} s; got {self.last:g}")
+        require(self.every > 0, f"`departures.every` must be above 0 s; got {self.every:g}")
+        count = (self.last - self.first) / self.every + 1
+        least = (self.last - self.first) / (MOST_SLICES - 1)
+        require(
+            count <= MOST_SLICES,
+            f"`departures.every` = {self.every:g} s makes {count:,.0f} departures, more than {MOST_SLICES:,}; "
+            f"make it at least {least:.6g}",
+        )
+
+    def times(self) -> tuple[float, ...]:
+        """All of them, rising."""
+        steps = math.floor((self.last - self.first) / self.every * (1 + 1e-12))
+        times = [min(self.first + n * self.every, self.last) for n in range(steps + 1)]
+        return tuple(times) if times[-1] == self.last else (*times, self.last)
+
+
+@dataclass(frozen=True)
 class Scenario:
-    """A problem as the TOML file describes it: one object for each section; `text` is the resolved TOML.
+    """A problem as the TOML file describes it: one object for each section; `text` is the complete TOML.
 
     Examples:
         >>> scenario = glider_stream.read_scenario("seed-box")
@@ -110,9 +145,10 @@ class Scenario:
     cost: Cost
     query: QueryPoints | None
     text: str
+    departures: Departures | None = None
 
     def problem(self) -> Problem:
-        """Build flow, terrain and glide polar, and put everything together."""
+        """Return the problem: flow, terrain, glide polar, and all else that a search needs."""
         lo, hi = self.domain.box()
         table, frame = polar(self.glider), self.domain.frame()
         horizon = self.integration.dt * self.integration.steps
@@ -121,18 +157,18 @@ class Scenario:
         times = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
         within = known.t_lo <= self.departure <= known.t_hi
         require(within, f"`query.departure` = {self.departure:g} s lies outside {times}; choose one of them")
-        fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {known.max_speed:g}; mend [flow]"
+        fast = f"the current of the flow must be at most {FASTEST:g} m/s; got {known.max_speed:g}: mend [flow]"
         require(known.max_speed <= FASTEST, fast)
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
         text += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
-            text += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
+            text += f"; it changes with time, and legs hold for {self._when()}"
         sampler = self.sampler
         if isinstance(sampler, YoSampler):
             sampler = sampler.for_glide(float(table.best_angle.max()))
         if frame is not None and isinstance(self.domain, GeographicDomain):
             error = frame.scale_error(self.domain.lon, self.domain.lat)
-            text += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
+            text += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, wrong by up to {100 * error:.2g} %"
         return Problem(
             evaluator=Evaluator(flow, terrain, table, self.method, self.integration, self.cost),
             sampler=sampler,
@@ -150,22 +186,45 @@ class Scenario:
             frozen=self.query is not None and self.query.frozen,
             bins=None if self.query is None else self.query.bins,
             domain=self.domain,
+            slices=self._slices(flow),
         )
 
     @property
     def departure(self) -> float:
-        """When gliders leave their nodes [s]."""
+        """The time when gliders leave their nodes [s]."""
         return 0.0 if self.query is None else self.query.departure
 
+    def _when(self) -> str:
+        several = self.departures is not None and self.departures.first < self.departures.last
+        return "the departures of their slices" if several else f"departure at {self.departure:g} s"
+
+    def _slices(self, flow: Flow) -> tuple[float, ...]:
+        """The departures of the roadmap's slices [s]; none where the scenario has no [departures]."""
+        if self.departures is None:
+            return ()
+        first, last, known = self.departures.first, self.departures.last, flow.extent
+        why = "[departures] makes slices of a flow that changes, and this one does not; remove that section"
+        require(not is_steady(flow), why)
+        span = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
+        for name, value in (("first", first), ("last", last)):
+            within = known.t_lo <= value <= known.t_hi
+            require(within, f"`departures.{name}` = {value:g} s lies outside {span}; choose one of them")
+        require(
+            first <= self.departure <= last,
+            f"`query.departure` = {self.departure:g} s lies outside [departures], {first:g} to {last:g} s; "
+            "choose a time between",
+        )
+        return self.departures.times()
+
     def _departs(self) -> datetime | None:
-        """When gliders leave, by the calendar, where the flow says when t = 0 is."""
+        """The date when gliders leave (UTC), or None if the flow has no date."""
         if not isinstance(self.flow, OceanFlow) or self.flow.epoch is None:
             return None
         epoch = parse_time(self.flow.epoch, "`flow.epoch`").item()
         return cast(datetime, epoch).replace(tzinfo=UTC) + timedelta(seconds=self.departure)
 
     def _waters(self, glide: float, horizon: float) -> tuple[Flow, Terrain, str]:
-        """Flow and terrain; `glide` [m] is how far a glider gets in still water within the horizon [s]."""
+        """Return flow, terrain and a text on them; `glide` [m] is the way in still water within `horizon` [s]."""
         if isinstance(self.flow, OceanFlow):
             require(
                 isinstance(self.domain, GeographicDomain),
@@ -181,7 +240,7 @@ class Scenario:
         lo, hi = self.domain.box()
         flow = self.flow.kernel((lo[2], hi[2]))
         if self.flow.sampled is not None:
-            # no path between two nodes strays further from the box than half of what a leg can cover
+            # no path between two nodes leaves the box by more than half the length of the longest leg
             stray = (glide + flow.extent.max_speed * horizon) / 2
             x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
             exact, flow = flow, sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
@@ -204,25 +263,28 @@ class Scenario:
         return flow, seabed, f"{text}; {also}"
 
     def _grounds(self, box: tuple[Array, Array], bottoms: list[Bottom]) -> tuple[Seabed, str]:
-        """The terrain of a geographic domain over a box [m], of what is known and what is asked for."""
+        """Return the terrain over a box [m] and a text on it: the known bottoms and the [terrain] section."""
         require(
             isinstance(self.domain, GeographicDomain),
             "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
         )
         assert isinstance(self.domain, GeographicDomain)
-        domain, frame, asked = self.domain, self.domain.frame(), self.terrain
-        if asked.bathymetry is not None:
+        domain, frame, settings = self.domain, self.domain.frame(), self.terrain
+        if settings.bathymetry is not None:
             from .water.ocean.bathymetry import read_bathymetry
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
-            text = asked.variable, asked.positive, asked.names
-            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *text)]
-        return raster_terrain(asked, frame, *box, bottoms, domain.box())
+            text = settings.variable, settings.positive, settings.names
+            bottoms = [
+                *bottoms,
+                read_bathymetry(settings.bathymetry, frame, domain.lon, domain.lat, stray, *text),
+            ]
+        return raster_terrain(settings, frame, *box, bottoms, domain.box())
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package, by name.
+    """Return the scenarios that come with the package, by name.
 
     Examples:
         >>> "seed-box" in glider_stream.shipped_scenarios()
@@ -233,11 +295,11 @@ def shipped_scenarios() -> dict[str, Path]:
 
 
 def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
-    """A scenario from a TOML file, or a shipped one by its name.
+    """Return the scenario in a TOML file, or a shipped one by its name.
 
-    `overrides` are section.key=value each. Where they choose another kind of a section, the keys of the old
-    kind that the new one does not know are dropped, unless they are overridden, too. File names in the
-    scenario are relative to its folder, in overrides to the working directory.
+    `overrides` are texts section.key=value. If they choose another kind of a section, the keys of the old kind
+    that the new kind does not have are dropped, unless they are also overridden. File names in the scenario are
+    relative to its folder, those in overrides to the working folder.
 
     Examples:
         >>> scenario = glider_stream.read_scenario("seed-box", ["steering.method=flow-map"])
@@ -253,14 +315,14 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         f"the scenario {name} is neither a file nor a shipped scenario; choose a file, or one of: {shipped}",
     )
     try:
-        # some editors begin a file with a byte order mark
+        # some editors write a byte order mark at the start
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise InputError(f"the scenario {name} cannot be read: {error.strerror}") from None
+        raise InputError(f"the scenario {name} cannot be read: {error.strerror}; name another") from None
     except UnicodeDecodeError as error:
-        raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as such") from None
+        raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as UTF-8") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"the scenario {name} is not valid TOML: {error}; mend that place") from None
+        raise InputError(f"the scenario {name} is not valid TOML: {error}; mend this place") from None
     check_depth(table, f"the scenario {name}")
     _override(table, overrides)
     check_depth(table, "`--set`")
@@ -268,7 +330,7 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def scenario_from_text(text: str) -> Scenario:
-    """The scenario that a roadmap carries."""
+    """Return the scenario from the text that a roadmap holds."""
     try:
         table = tomllib.loads(text)
         check_depth(table, "the roadmap's scenario")
@@ -277,8 +339,8 @@ def scenario_from_text(text: str) -> Scenario:
         raise InputError(f"the roadmap's scenario is not valid TOML: {error}") from None
 
 
-def scenario_of(road: Roadmap) -> Scenario:
-    """The scenario that a roadmap carries, its files found again where they or the roadmap have moved."""
+def scenario_of(road: Roadmap | SlicedRoadmap) -> Scenario:
+    """Return the scenario that a roadmap holds; its files are found again if they or the roadmap have moved."""
     text = road.provenance.scenario
     try:
         table: dict[str, Any] = tomllib.loads(text)
@@ -300,7 +362,7 @@ def scenario_of(road: Roadmap) -> Scenario:
 
 
 def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
-    """Check every block; relative file names are relative to `folder`."""
+    """Return the scenario of a table, with every key checked; file names are relative to `folder`."""
     for name, block in table.items():
         require(name in SECTIONS, f"the section `{name}` is not known; choose from: {', '.join(SECTIONS)}")
         require(isinstance(block, Mapping), f"`{name}` must be a section, [{name}]; got {block!r}")
@@ -326,16 +388,17 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         cost=blocks["cost"],
         query=from_table(QueryPoints, table["query"], "query") if "query" in table else None,
         text=to_toml(table),
+        departures=from_table(Departures, table["departures"], "departures") if "departures" in table else None,
     )
 
 
 def _dated(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A section with TOML's bare dates as texts: `epoch = 2024-11-20T12:00:00` says what its text would."""
+    """Return a section with TOML's dates as texts, so that `epoch = 2024-11-20T12:00:00` needs no quotes."""
     return {key: value.isoformat() if isinstance(value, date) else value for key, value in table.items()}
 
 
 def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A table with its file names made absolute."""
+    """Return a table with absolute file names."""
     result = dict(table)
     for key in FILES & set(table):
         several = not isinstance(table[key], str)
@@ -343,9 +406,9 @@ def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         if isinstance(names, list) and all(isinstance(name, str) for name in names):
             found = [str((folder / name).absolute()) for name in names]
             for name in found:
-                # a roadmap keeps it as text
+                # a roadmap holds it as text
                 utf_8 = not any("\ud800" <= letter <= "\udfff" for letter in name)
-                require(utf_8, f"`{key}` = {name!r} is a name that is not UTF-8; rename the file, or its folder")
+                require(utf_8, f"`{key}` = {name!r} is not a name in UTF-8; rename the file or its folder")
             result[key] = found if several or key != "bathymetry" else found[0]
     return result
 
@@ -363,7 +426,7 @@ def _override(table: dict[str, Any], overrides: Sequence[str]) -> None:
 
 
 def _kind_keys(table: Mapping[str, Any], section: str) -> set[str]:
-    """The keys that the chosen kind of a section knows; none where the choice is not known."""
+    """Return the keys of a section's chosen kind; empty if the choice is unknown."""
     selector, kinds = KINDS[section]
     block = table.get(section)
     name = block.get(selector) if isinstance(block, dict) else None
@@ -372,7 +435,7 @@ def _kind_keys(table: Mapping[str, Any], section: str) -> set[str]:
 
 
 def _set(table: dict[str, Any], override: str) -> list[str]:
-    """Put a value, TOML or else a bare text, in its place, and return the place."""
+    """Set a value, which is TOML or else a plain text, and return its place."""
     place, equals, text = override.partition("=")
     keys = [key.strip() for key in place.split(".")]
     well = bool(equals) and len(keys) >= 2 and all(keys) and "\n" not in override

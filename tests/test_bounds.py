@@ -59,7 +59,7 @@ def road(place):
     ],
 )
 @pytest.mark.skipif(os.name == "nt", reason="no named pipes")
-def test_a_pipe_is_no_input(road, capsys, line):
+def test_a_pipe_is_refused_as_input(road, capsys, line):
     for name in line.split():
         if name.startswith("pipe"):
             os.mkfifo(name)
@@ -81,6 +81,7 @@ def test_the_ends_of_the_calendar(epoch):
         parse_time(epoch, "`flow.epoch`")
 
 
+@pytest.mark.slow
 def test_a_header_of_many_dots(place, capsys):
     text = Path("small.toml").read_text()
     dots = ".a" * 20_000
@@ -102,6 +103,7 @@ def star(count):
     return {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
 
 
+@pytest.mark.slow
 def test_polygons_are_bounded(place):
     pytest.importorskip("shapely")
     frame = LocalFrame(10.0, 40.0)

@@ -18,6 +18,7 @@ from ..water.inspect import flow_sha256
 from .inputs import inputs_of, names_of
 from .problem import Problem
 from .roadmap import Provenance, Roadmap
+from .slices import SlicedRoadmap
 
 _version = cache(version)
 """Versions of packages, which are read from files."""
@@ -51,7 +52,7 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
     )
 
 
-def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
+def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
     """InputError unless flow, terrain and glider are those that the roadmap was built with."""
     made = roadmap.provenance
     for name, digest, now in (

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -87,29 +88,41 @@ class StepSample:
         self.known = in_order([])
 
     def take(self, edges: Edges) -> None:
-        """Keep what an earlier run, or an older roadmap, knows of the nodes that may be sampled."""
+        """Keep what an earlier run, or an older roadmap, of one departure, knows of nodes that may be sampled."""
         wanted = np.unique(np.concatenate(self.samples))
         self.known = in_order([self.known, edges.of(np.isin(edges.source, wanted))])
 
     def checked(
-        self, made: Provenance, problem: Problem, position: Array, find: Callable[[Index], Iterable[Edges]]
+        self,
+        made: Provenance,
+        problem: Problem,
+        position: Array,
+        find: Callable[[Problem, Index], Iterable[Edges]],
     ) -> Provenance:
         """What makes a roadmap, with words on its steps; InputError where they are too coarse.
 
-        `find` evaluates some of the nodes `position` (n, 3) [m].
+        `find` evaluates some of the nodes `position` (n, 3) [m] at the departure of a problem. Of many departures
+        the first, the last and the one in the middle are looked at, anew each time.
         """
-        edges = self._legs(find)
-        error = step_error(problem, position[np.repeat(edges.source, edges.degree)], edges.values)
-        error.check()
-        return replace(made, steps=str(error))
+        times = problem.departures
+        errors = []
+        for when in sorted({times[0], times[len(times) // 2], times[-1]}):
+            one = replace(problem, departure=when, slices=())
+            edges = self._legs(partial(find, one))
+            errors.append(step_error(one, position[np.repeat(edges.source, edges.degree)], edges.values))
+        worst = max(errors, key=lambda error: error.off)
+        worst = replace(worst, legs=sum(error.legs for error in errors))
+        worst.check()
+        return replace(made, steps=str(worst))
 
     def _legs(self, find: Callable[[Index], Iterable[Edges]]) -> Edges:
         """The legs of the first sample that has enough of them, or of the widest."""
+        known = self.known
         for nodes in self.samples:
-            missing = np.setdiff1d(nodes, self.known.source)
+            missing = np.setdiff1d(nodes, known.source)
             if missing.size:
-                self.known = in_order([self.known, *find(missing)])
-            edges = self.known.of(np.isin(self.known.source, nodes))
+                known = in_order([known, *find(missing)])
+            edges = known.of(np.isin(known.source, nodes))
             if edges.target.size >= SAMPLED_LEGS:
                 break
         return edges

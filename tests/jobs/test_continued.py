@@ -20,6 +20,8 @@ from glider_stream.roadmap import store
 from glider_stream.roadmap.roadmap import Edges, by_node, in_order
 from glider_stream.roadmap.store import read_roadmap
 
+pytestmark = pytest.mark.slow
+
 NODES = 77
 KEEP = np.arange(NODES) % 3 != 1
 OTHER = np.arange(NODES) < 40
@@ -168,7 +170,7 @@ def test_parts_by_their_nodes():
 
 
 @pytest.mark.parametrize("name", ["env", "road.h5", "a[1]*.h5", "env.local"])
-def test_what_is_left_is_told_from_what_is_not_ours(tmp_path, name):
+def test_left_over_files_are_distinguished_from_files_of_others(tmp_path, name):
     target = tmp_path / name
     suffix = target.suffix
     alien = [
@@ -206,12 +208,12 @@ def test_a_build_named_as_a_users_files(place):
     assert datasets("env") == datasets("old.h5")
     Path("env.journal").write_text("my diary")
     for restart in (False, True):
-        with pytest.raises(InputError, match="is in the way of this build's journal"):
+        with pytest.raises(InputError, match="has the name of this build's journal"):
             build_file(problem(place), "env", job=Job(restart=restart))
     assert Path("env.journal").read_text() == "my diary"
     os.remove("env.journal")
     os.mkfifo("env.journal")
-    with pytest.raises(InputError, match="is in the way of this build's journal"):
+    with pytest.raises(InputError, match="has the name of this build's journal"):
         build_file(problem(place), "env")
 
 

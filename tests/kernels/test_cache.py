@@ -65,6 +65,7 @@ def cached(folder):
     return {path.relative_to(folder): path.stat().st_mtime_ns for path in found}
 
 
+@pytest.mark.slow
 def test_a_new_process_starts_from_disk_and_an_edit_is_never_stale(copy):
     cold = run(copy)
     files = cached(copy)

@@ -49,7 +49,7 @@ def test_the_least_depth_is_said_where_the_plan_goes_above_it():
 @pytest.mark.parametrize(
     ("stops", "words"),
     [
-        ([[0, 0, 0], [900.0, 0.0, -1200.0]], "dives to 1200 m, and a Slocum's yo ends at 1000 m"),
+        ([[0, 0, 0], [900.0, 0.0, -1200.0]], "dives to 1200 m, but a Slocum's yo ends at 1000 m"),
         ([[0, 0, 0], [900.0, 0.0, -2.5]], "stays between 0 and 2.5 m"),
     ],
 )
@@ -66,24 +66,24 @@ def test_what_no_yo_can_fly_is_refused(stops, words):
     [
         ("c_target_depth(m) 3 ", "c_target_depth(m) 0 ", "c_target_depth must be from 3 to 1000; got 0"),
         ("d_target_depth(m) 199.9", "d_target_depth(m) 2000", "d_target_depth must be from 3 to 1000; got 2000"),
-        ("c_target_depth(m) 3 ", "c_target_depth(m) 250 ", "c_target_depth is 250, and it must lie above"),
+        ("c_target_depth(m) 3 ", "c_target_depth(m) 250 ", "c_target_depth is 250; it must be less than"),
         (
             "d_pitch_value(X)",
             "d_pitch_value(rad)",
-            r"d_pitch_value has the unit rad, and its name is d_pitch_value(X)",
+            r"d_pitch_value has the unit rad; write d_pitch_value(X)",
         ),
-        ("d_pitch_value(X) -0.4000", "d_pitch_value(X) 0.4000", "d_pitch_value is 0.4, and it must be below 0"),
+        ("d_pitch_value(X) -0.4000", "d_pitch_value(X) 0.4000", "d_pitch_value is 0.4; it must be below 0"),
         (
             "c_pitch_value(X) 0.4000",
             "c_pitch_value(X) 26",
-            "c_pitch_value is 26, and it counts in radians: 0.4538",
+            "c_pitch_value is 26, but its unit is radians: 26 degrees are 0.4538",
         ),
         ("c_pitch_value(X) 0.4000", "c_pitch_value(X) ??", "c_pitch_value must be one number; got '??'"),
         ("start_when(enum) 2", "start_when(enum) 13", "start_when must be one of 0, 1, 2, 4; got 13"),
         ("d_target_depth", "target_depth", "target_depth is not known as an argument of yo"),
         ("d_use_pitch(enum) 3", "d_use_pitch(enum) 2.5", "d_use_pitch must be one of"),
         ("to_do(nodim) -1", "to_do(nodim) 0", "num_half_cycles_to_do must not be 0"),
-        ("c_use_pitch(enum) 3", "d_use_pitch(enum) 3", "d_use_pitch stands twice"),
+        ("c_use_pitch(enum) 3", "d_use_pitch(enum) 3", "d_use_pitch is given twice"),
         ("<end:b_arg>", "", "must stand between <start:b_arg> and <end:b_arg>"),
         ("# glide", "glide", "line 2 is neither an argument nor a waypoint"),
         ("glide angles", "glide angles of 26°", "line 2 has a character outside ASCII"),
@@ -118,17 +118,17 @@ def test_what_public_yo_files_may_say(old, new):
     ("old", "new", "said"),
     [
         ("num_waypoints(nodim) 2", "num_waypoints(enum) 2", "num_waypoints has the unit enum"),
-        ("\tb_arg: num_waypoints(nodim) 2\n", "", "num_waypoints is not said, and there are 2 rows"),
+        ("\tb_arg: num_waypoints(nodim) 2\n", "", "num_waypoints is not given, but there are 2 rows"),
         (
             "wpt(enum) 0 ",
             "wpt(enum) -07300.0    3850.2 ",
             "initial_wpt must be one number; got '-07300.0    3850.2'",
         ),
-        ("wpt(enum) 0 ", "wpt(enum) 2 ", "initial_wpt is 2, and the last of 2 waypoints has the number 1"),
+        ("wpt(enum) 0 ", "wpt(enum) 2 ", "initial_wpt is 2, but the last of 2 waypoints has the number 1"),
         ("wpt(enum) 0 ", "wpt(enum) -2 ", "initial_wpt is -2, the closest: an ordered route begins at 0"),
         ("run(nodim) -2", "run(nodim) -3", "num_legs_to_run must be from -2; got -3"),
         ("dist(m) 500", "dist(m) 5", "list_when_wpt_dist must be from 10; got 5"),
-        ("-7354.0000\t3918.0000", "7354.0000\t3918.0000", "km from the waypoint before it; look at its signs"),
+        ("-7354.0000\t3918.0000", "7354.0000\t3918.0000", "km from the waypoint before it; check its signs"),
         ("list_stop_when", "stop_when", "stop_when is not known as an argument of goto_list"),
         ("<start:waypoints>", "<start:waypoints>\n7412", "the row '7412' is not a longitude and a latitude"),
     ],
@@ -157,18 +157,18 @@ def test_how_many_waypoints_a_list_may_hold_is_the_installations(tmp_path, capsy
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("goto=WP002\n", "goto=WP003\n", "target WP001 in line 2 has goto=WP003, and there is no such target"),
+        ("goto=WP002\n", "goto=WP003\n", "target WP001 in line 2 has goto=WP003, but that target does not exist"),
         ("radius=200 goto=WP002\nWP002", "radius=200 goto=WP002 \nWP002", "line 2 begins or ends with a blank"),
-        ("radius=200", "radius=0", "has radius=0, and it must be from 0.001"),
+        ("radius=200", "radius=0", "has radius=0; it must be from 0.001"),
         (" radius=200", "", "target WP001 in line 2 has no radius"),
-        ("radius=200", "radius=200 speed=3", "says speed, which is not known"),
+        ("radius=200", "radius=200 speed=3", "has the unknown key speed"),
         ("lat=3800", "lat=3870", "has lat=3870"),
         ("lat=3800", "lat=9800", "98.0063 degrees; at most 90"),
-        ("WP002 lat", "WP001 lat", "target WP001 in line 3 stands twice"),
+        ("WP002 lat", "WP001 lat", "target WP001 in line 3 is given twice"),
         ("WP001 lat", "WP-1 lat", "must have a name of letters and numbers"),
         ("/ a route", "/ a 26° route", "outside ASCII"),
-        ("radius=200", "radius=200 escape=HOME", "has escape=HOME, and there is no such target"),
-        ("radius=200", "radius=200 finish=400", "has finish=400, and it must be from -1 to 360"),
+        ("radius=200", "radius=200 escape=HOME", "has escape=HOME, but that target does not exist"),
+        ("radius=200", "radius=200 finish=400", "has finish=400; it must be from -1 to 360"),
         ("radius=200", "radius 200", "must be a name and key=value"),
     ],
 )
@@ -214,13 +214,16 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     ("content", "words"),
     [
         (None, "cannot be read: no such file"),
-        (b"behavior_name=surface\n<start:b_arg>\n<end:b_arg>\n", "holds the behavior 'surface'; goto lists"),
+        (
+            b"behavior_name=surface\n<start:b_arg>\n<end:b_arg>\n",
+            "holds the behavior 'surface'; give a goto list",
+        ),
         (b"lon,lat\n1,2\n", "holds neither a behavior_name nor targets"),
         (b"\x89HDF\0\0", "is not a text"),
         (b"a" * 1_000_001, "holds more than 1,000,000 bytes"),
     ],
 )
-def test_what_cannot_be_looked_through_is_exit_code_2(tmp_path, capsys, content, words):
+def test_a_file_that_cannot_be_linted_is_exit_code_2(tmp_path, capsys, content, words):
     file = tmp_path / "some.ma"
     if content is not None:
         file.write_bytes(content)

@@ -94,9 +94,9 @@ BROKEN = [
     ("a.json", '{"legs": []}', "it holds no leg"),
     ("a.json", '{"legs": [{"from": [1, 2], "to": [3, 4]}]}', "point 1 of a.json must be three finite numbers"),
     ("a.json", '{"legs": [{"from": null, "to": 3}]}', "point 1"),
-    ("a.json", "[1, 2]", "is not built as one is"),
-    ("a.json", "7", "is not built as one is"),
-    ("a.geojson", '{"type": "LineString", "coordinates": [[1], [2]]}', "is not built as one is"),
+    ("a.json", "[1, 2]", "is not built like a route file"),
+    ("a.json", "7", "is not built like a route file"),
+    ("a.geojson", '{"type": "LineString", "coordinates": [[1], [2]]}', "is not built like a route file"),
     ("a.geojson", '{"type": "LineString", "coordinates": [[1' + "0" * 400 + ", 2], [3, 4]]}", "point 1"),
     ("a.geojson", '{"type": "LineString", "coordinates": [[1, 2, 1' + "0" * 400 + "], [3, 4]]}", "is not built"),
     ("a.geojson", '{"type": "LineString", "coordinates": [[NaN, 2], [3, 4]]}', "three finite numbers; got .nan"),
@@ -106,10 +106,14 @@ BROKEN = [
     ("a.csv", "lon,lat,depth\n1,2,\n1,2,3\n", r"point 1 .* got \(1.0, 2.0, ''\)"),
     ("a.csv", "lon,lat\n1\n1,2\n", "point 1"),
     ("a.csv", "\x00", "columns are none"),
-    ("a.csv", "name,lat,lon,eta,depth_min,depth_max\nWP001,1,2,3,0,50\nWP002,1,2,3,0,50\n", "how deep legs end"),
+    (
+        "a.csv",
+        "name,lat,lon,eta,depth_min,depth_max\nWP001,1,2,3,0,50\nWP002,1,2,3,0,50\n",
+        "the depths where legs end",
+    ),
     ("a.csv", "lon,lat\n" + 10_001 * "1,2\n", "from 2 to 10,000 points; got 10001"),
     ("a.csv", "x" * (MOST_TEXT + 1), "more than the 20,000,000 bytes"),
-    ("a.gpx", "<gpx><rte><rtept lat='1'/></rte></gpx>", "is not built as one is"),
+    ("a.gpx", "<gpx><rte><rtept lat='1'/></rte></gpx>", "is not built like a route file"),
     ("a.gpx", "<gpx creator='glider-stream'/>", "no route point"),
     ("a.gpx", "<a>" * 100_000 + "</a>" * 100_000, "no route point"),
     ("a.kml", "<kml/>", "no line and no points"),
@@ -120,7 +124,7 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("name", "content", "words"), BROKEN)
-def test_what_is_no_route_is_one_sentence(tmp_path, name, content, words):
+def test_a_file_that_is_not_a_route_gives_one_sentence(tmp_path, name, content, words):
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=words) as refused:
         read_drawn(tmp_path / name)
@@ -128,7 +132,7 @@ def test_what_is_no_route_is_one_sentence(tmp_path, name, content, words):
     assert len(str(refused.value)) < 500
 
 
-def test_what_is_no_text_and_no_file(tmp_path):
+def test_a_route_that_is_not_a_text_or_not_a_file(tmp_path):
     (tmp_path / "a.gpx").write_bytes('<?xml version="1.0"?><!DOCTYPE g><gpx/>'.encode("utf-16"))
     with pytest.raises(InputError, match=r"cannot be read as a route: .*utf-8"):
         read_drawn(tmp_path / "a.gpx")

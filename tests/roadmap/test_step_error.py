@@ -18,6 +18,7 @@ from glider_stream.roadmap.roadmap import EDGE_FIELDS, in_order
 from glider_stream.roadmap.shard import Shard
 from glider_stream.roadmap.step_error import (
     SAMPLED_LEGS,
+    SAMPLED_NODES,
     UNTRIED,
     StepError,
     StepSample,
@@ -102,7 +103,7 @@ def test_the_error_is_how_far_an_exact_path_ends_from_the_legs_own(tmp_path, mon
 
 def test_the_sample_is_of_few_nodes_the_last_ones_among_them():
     assert list(sampled_nodes(3)) == [0, 1, 2]
-    assert len(sampled_nodes(100_000)) == 8
+    assert len(sampled_nodes(100_000)) == SAMPLED_NODES
     assert sampled_nodes(100_000)[-1] == 99_999
     assert (np.diff(sampled_nodes(500)) > 0).all()
 
@@ -129,5 +130,5 @@ def test_a_query_flies_what_legs_there_are_where_the_build_had_none_to_fly(tmp_p
 
 def test_samples_grow_to_all_nodes_or_the_most():
     assert [list(nodes) for nodes in wider_samples(3)] == [[0, 1, 2]]
-    assert [nodes.size for nodes in wider_samples(20)] == [8, 16, 20]
-    assert [nodes.size for nodes in wider_samples(10**6)] == [8, 16, 32, 64, 128]
+    assert [nodes.size for nodes in wider_samples(20)] == [16, 20]
+    assert [nodes.size for nodes in wider_samples(10**6)] == [16, 32, 64, 128]

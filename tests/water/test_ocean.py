@@ -173,7 +173,7 @@ def test_packed_integers(tmp_path):
 
 @pytest.mark.parametrize("fill", [1e20, 1.2676506e30, 9.96921e36, -9999.0, np.nan, 999.0, -99.0])
 @pytest.mark.parametrize("declared", [True, False])
-def test_fills_are_no_water_and_do_not_reach_beside_the_coast(tmp_path, fill, declared):
+def test_fill_values_are_not_water_and_do_not_spoil_the_coast(tmp_path, fill, declared):
     data = both(dataset(), lambda one: one.where(one.lon > 20.25, fill))
     encoding = {"uo": {"_FillValue": fill}, "vo": {"_FillValue": fill}} if declared else {}
     file = read_currents(written(tmp_path, data, encoding=encoding))
@@ -315,14 +315,14 @@ def without_attr(data, name, key):
 
 REFUSALS = {
     "unit": (lambda d: with_attrs(d, "uo", units="furlong/fortnight"), "furlong/fortnight"),
-    "no unit": (lambda d: renamed(d, "u", "v"), "has no unit .* name `units`"),
+    "no unit": (lambda d: renamed(d, "u", "v"), "has no unit .* set `units`"),
     "no unit and too fast": (lambda d: renamed(units(d, "", 0.01), "uo", "vo"), "has no unit"),
     "wrong unit": (lambda d: both(d, lambda one: 100 * one), "no ocean current"),
     "half staggered": (staggered, "different points that make no staggered grid"),
     "sigma": (lambda d: with_attrs(d, "depth", standard_name="ocean_s_coordinate_g2"), "no depth of the seabed"),
     "pressure": (lambda d: with_attrs(d, "depth", units="dbar"), "'dbar'"),
     "heights": (lambda d: with_attrs(d, "depth", positive="up"), "positive up"),
-    "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no longitude"),
+    "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no coordinate that is known"),
     "no time unit": (lambda d: without_attr(d, "time", "units"), "hours since"),
     "odd time unit": (lambda d: with_attrs(d, "time", units="fortnights since 2000-01-01"), "fortnights"),
     "dates that are none": (
@@ -330,7 +330,7 @@ REFUSALS = {
         "360_day",
     ),
     "two members": (lambda d: xr.concat([d, d], "member"), "`member`"),
-    "two candidates": (lambda d: d.assign(a=d.uo, b=d.vo).rename(uo="c", vo="d"), "name `u` and `v`"),
+    "two candidates": (lambda d: d.assign(a=d.uo, b=d.vo).rename(uo="c", vo="d"), "set `u` and `v`"),
     "mooring": (lambda d: d.isel(lon=[0], lat=[0]), "one position"),
     "trajectory": (lambda d: d.assign_attrs(featureType="trajectory"), "trajectory"),
     "mesh": (
