@@ -46,6 +46,22 @@ def key_and_value(text: str) -> tuple[str, Any]:
     return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
+class Percentage(click.ParamType[float]):
+    """A percentage such as 1%, as a share."""
+
+    name = "percentage"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The share."""
+        number = str(value).strip().removesuffix("%")
+        try:
+            if number != str(value).strip():
+                return float(number) / 100
+        except ValueError:
+            pass
+        self.fail(f"{value!r} is not a percentage, such as 1%", param, ctx)
+
+
 def _write_json(value: Any) -> None:
     say(json.dumps(value, indent=1))
 
@@ -149,6 +165,15 @@ ROUTE_OPTIONS = (
         "--polish", is_flag=True, help="Move the stops off the nodes, cut legs, count yos anew, while it pays."
     ),
     click.option(
+        "--within",
+        type=Percentage(),
+        metavar="PERCENT",
+        help="Add nodes where they can help, in rounds, until a round gains less, such as 1%.",
+    ),
+    click.option(
+        "--seconds", type=float, metavar="SECONDS", help="Refine as --within, as long as another round fits."
+    ),
+    click.option(
         "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
     ),
     click.option(
@@ -215,6 +240,8 @@ def _answer(
     most_yos: int | None,
     most_hours: float | None,
     polish: bool,
+    within: float | None,
+    seconds: float | None,
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
@@ -228,7 +255,7 @@ def _answer(
     as_json: bool,
 ) -> None:
     """Print what was asked for of a roadmap or a scenario; exit code 1 where there is no path."""
-    from .pilot.export import check_export
+    from .opened import split_outputs
     from .search.surfacing import Surfacing
 
     free = most_yos is None and most_hours is None
@@ -237,16 +264,19 @@ def _answer(
     answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    alone = not (outputs or polish or asked or as_card) and most_energy is None and thin is None
+    refines = within is not None or seconds is not None
+    alone = not (outputs or polish or refines or asked or as_card) and most_energy is None and thin is None
     if front and (departures or not alone):
         raise click.UsageError(
-            "--trade-off goes with none of --output, --most-energy, --polish, --thin, --card, "
-            "--window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave some out"
+            "--trade-off goes with none of --output, --most-energy, --polish, --within, --seconds, --thin, "
+            "--card, --window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave "
+            "some out"
         )
     if departures and not alone:
         raise click.UsageError(
-            "--depart-between and --arrive-by go with none of --output, --most-energy, --polish, --thin, "
-            "--card, --window-hours, --waypoints and --arrival-radius; set query.departure to what they find"
+            "--depart-between and --arrive-by go with none of --output, --most-energy, --polish, --within, "
+            "--seconds, --thin, --card, --window-hours, --waypoints and --arrival-radius; set query.departure to "
+            "what they find"
         )
     if not departures and (every is not None or figure is not None):
         raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
@@ -258,8 +288,7 @@ def _answer(
         answer = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
         found = answer.found
     else:
-        for output in outputs:
-            check_export(output)
+        split_outputs(outputs, refines)
         source = opened()
         path = source.query(
             start,
@@ -267,6 +296,9 @@ def _answer(
             outputs=outputs,
             most_energy=most_energy,
             polish=polish,
+            within=within,
+            seconds=seconds,
+            progress=lambda line: say(line, error=True),
             thin=thin,
             surfacing=rule,
             **asked,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from .base.arrays import Array
+from .base.output import check_output
 from .base.settings import require
 from .pilot.card import Card
 from .pilot.card import card as card_of
@@ -27,6 +28,7 @@ from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
 from .search.path import Path, load_path
+from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .search.why_not import no_edges
@@ -36,6 +38,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+
+
+def split_outputs(outputs: Sequence[str | File], refines: bool) -> tuple[list[str | File], list[str | File]]:
+    """The route files of a query's outputs, and the roadmap files; checked before anything is done."""
+    roadmaps = [output for output in outputs if File(output).suffix == ".h5"]
+    cure = "add --within or --seconds, or leave it out"
+    require(
+        refines or not roadmaps, f"a query writes a roadmap only where it refines; got {roadmaps[:1]}; {cure}"
+    )
+    routes = [output for output in outputs if output not in roadmaps]
+    for output in routes:
+        check_export(output)
+    for output in roadmaps:
+        check_output(output)
+    return routes, roadmaps
 
 
 class OpenedScenario:
@@ -102,8 +119,11 @@ class OpenedScenario:
         outputs: Sequence[str | File] = (),
         most_energy: float | None = None,
         polish: bool = False,
+        within: float | None = None,
+        seconds: float | None = None,
         thin: float | None = None,
         surfacing: Surfacing | None = None,
+        progress: Callable[[str], None] = lambda line: None,
         window_hours: float = HOURS,
         most_waypoints: int = MOST_WAYPOINTS,
         arrival_radius: float | None = None,
@@ -111,7 +131,10 @@ class OpenedScenario:
         """The cheapest path between two points, written to each of `outputs`.
 
         `most_energy` [J] asks for the fastest of the paths of `trade_off` that uses no more. `polish` moves the
-        stops off the nodes, cuts legs and counts yos anew, as long as the cost falls. `thin` [m] joins legs whose
+        stops off the nodes, cuts legs and counts yos anew, as long as the cost falls. `within` refines: nodes are
+        added where they can help, in rounds, until one gains less than such a share of the cost, 0.01 for 1 %;
+        with `seconds` no round begins that would likely end later; `progress` is told of each. An output that
+        ends in .h5 is the roadmap with those nodes. `thin` [m] joins legs whose
         stops lie so near the straight line, where one glide does, and none where that breaks another rule.
         `surfacing` is a rule for how often to come up; the scenario's own if None. Exported windows last
         `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within `arrival_radius` [m],
@@ -122,10 +145,25 @@ class OpenedScenario:
             >>> len(path.legs), round(path.travel_time)
             (3, 430)
         """
-        for output in outputs:
-            check_export(output)
+        asked = None if within is None and seconds is None else Asked(within, seconds)
+        outputs, roadmaps = split_outputs(outputs, asked is not None)
         planner, ends = self.planner(surfacing), self._ends(start, goal)
-        path = best_path(planner, ends, most_energy=most_energy, polish=polish, thinned=thin)
+
+        def refine(path: Path, polish: Callable[[Path], Path]) -> Path:
+            assert asked is not None
+            found = refined(planner, self._roadmap, ends, path, asked, polish, progress)
+            for file in roadmaps:
+                found.write(file)
+            return found.path
+
+        path = best_path(
+            planner,
+            ends,
+            most_energy=most_energy,
+            polish=polish,
+            refine=None if asked is None else refine,
+            thinned=thin,
+        )
         check_legs(path, outputs)
         notes: list[str] = []
         written = {

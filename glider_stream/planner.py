@@ -10,10 +10,9 @@ from .base.output import check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
-from .opened import OpenedRoadmap, open_either, open_scenario
+from .opened import OpenedRoadmap, open_either, open_scenario, split_outputs
 from .opened import open as open_roadmap
 from .pilot.card import Card
-from .pilot.export import check_export
 from .pilot.lint import Linted
 from .pilot.lint import lint as lint_file
 from .pilot.score import Score
@@ -195,6 +194,8 @@ def query(
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
     polish: bool = False,
+    within: float | None = None,
+    seconds: float | None = None,
 ) -> Path:
     """The cheapest path between two points, see `OpenedRoadmap.query`.
 
@@ -205,14 +206,15 @@ def query(
         >>> len(path.legs), round(path.travel_time)
         (3, 430)
     """
-    for output in outputs:
-        check_export(output)  # before the roadmap is read
+    split_outputs(outputs, within is not None or seconds is not None)  # before the roadmap is read
     return open_roadmap(roadmap).query(
         start,
         goal,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
+        within=within,
+        seconds=seconds,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
@@ -233,6 +235,8 @@ def plan(
     *,
     overrides: Sequence[str] = (),
     polish: bool = False,
+    within: float | None = None,
+    seconds: float | None = None,
 ) -> Path:
     """The cheapest path of a scenario without a roadmap; all else as in `query`.
 
@@ -241,14 +245,15 @@ def plan(
         >>> path.found
         True
     """
-    for output in outputs:
-        check_export(output)
+    split_outputs(outputs, within is not None or seconds is not None)
     return open_scenario(scenario, overrides).query(
         start,
         goal,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
+        within=within,
+        seconds=seconds,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,

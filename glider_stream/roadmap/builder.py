@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import threads
 from ..kernels.edges import STATUS, TIME, Status
 from .pairs import Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
-from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
+from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 from .step_error import StepSample
 
 BATCH_PAIRS = 100_000
@@ -59,23 +59,32 @@ def warm_up(problem: Problem) -> None:
 
 
 def find_edges(
-    problem: Problem, position: Array, source: Index | None = None, batch_pairs: int = BATCH_PAIRS
+    problem: Problem,
+    position: Array,
+    source: Index | None = None,
+    batch_pairs: int = BATCH_PAIRS,
+    departure: Array | None = None,
+    wanted: Callable[[Index], Bools] | None = None,
 ) -> Iterator[Edges]:
     """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
 
-    Neither the number of threads nor the batches change a bit of the result.
+    Each node is left at its `departure` (n,) [s], all at the problem's if None; `wanted` says of some sources to
+    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the
+    batches change a bit of the result.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     legs = problem.legs(position)
     source = np.arange(len(position)) if source is None else source
     size = max(1, batch_pairs // legs.pairs_per_node)
     for first in range(0, len(source), size):
-        yield _evaluated(legs, source[first : first + size])
+        some = source[first : first + size]
+        when = None if departure is None else departure[some]
+        yield _evaluated(legs, some, when, None if wanted is None else wanted(some))
 
 
-def _evaluated(legs: Legs, source: Index) -> Edges:
+def _evaluated(legs: Legs, source: Index, departure: Array | None, wanted: Bools | None) -> Edges:
     began = time.perf_counter()
-    batch = legs.of(source)
+    batch = legs.of(source, departure, wanted)
     status = batch.outcomes[:, STATUS].astype(np.int64)
     connected = status == Status.CONNECTED
     node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
@@ -137,17 +146,21 @@ def build_roadmap(
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
             parts.append(edges)
             progress(tally.add(edges))
-    whole = in_order(parts)
-    values: dict[str, Any] = {n: np.ascontiguousarray(whole.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
+    return roadmap_of(problem, position, in_order(parts), made, tally)
+
+
+def roadmap_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> Roadmap:
+    """A roadmap of nodes (n, 3) [m] and the edges of all of them."""
+    values: dict[str, Any] = {n: np.ascontiguousarray(edges.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
     return Roadmap(
         position=position,
-        indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
-        target=whole.target,
+        indptr=np.concatenate([[0], np.cumsum(edges.degree)]),
+        target=edges.target,
         provenance=made,
         lonlat=lonlat_of(problem, position),
         counts=tally.by_name(),
         wall_s=tally.seconds,
-        threads=used,
-        node_counts=whole.counts,
+        threads=tally.threads,
+        node_counts=edges.counts,
         **values,
     )

@@ -1,5 +1,6 @@
 """What a query may ask beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs, a polish."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from ..base.arrays import Array
@@ -22,6 +23,8 @@ from .trade_off import TradeOff
 
 Ends = tuple[Array | None, Array | None]
 """Start and goal (3,) [m]; None for the scenario's own."""
+Refinement = Callable[[Path, Callable[[Path], Path]], Path]
+"""Refines a path; each round's route goes through the second."""
 
 
 def planner_of(problem: Problem, roadmap: Roadmap | None, rule: Surfacing) -> RoutePlanner:
@@ -43,22 +46,29 @@ def best_path(
     *,
     most_energy: float | None = None,
     polish: bool = False,
+    refine: Refinement | None = None,
     thinned: float | None = None,
 ) -> Path:
     """The cheapest path; within `most_energy` [J] the fastest; with `thinned` [m] of fewer legs, where they hold.
 
-    With `polish` its stops are moved until nothing near costs less. InputError where `most_energy` is asked of a
-    roadmap that has no energies, or with `polish`.
+    With `polish` its stops are moved until nothing near costs less; `refine` adds nodes where they can help.
+    InputError where `most_energy` is asked of a roadmap that has no energies, or with either of these.
     """
-    both = polish and most_energy is not None
-    require(not both, "a route within a bound on energy is not polished: that makes its cost less, not its time")
+    for asked, done in ((polish, "polished"), (refine is not None, "refined")):
+        both = asked and most_energy is not None
+        require(
+            not both, f"a route within a bound on energy is not {done}: that makes its cost less, not its time"
+        )
     if most_energy is None:
         path = planner.query(*ends)
     else:
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
         _check_energy(planner)
         path = planner.within(*ends, most_energy)
-    path = polished(path, planner) if polish else path
+    if refine is not None:
+        path = refine(path, (lambda one: polished(one, planner)) if polish else (lambda one: one))
+    elif polish:
+        path = polished(path, planner)
     return path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
 
 
@@ -101,5 +111,6 @@ def polished(path: Path, planner: RoutePlanner) -> Path:
     chain = polisher.chain_of(path)
     if chain is None:
         return kept
-    better = replace(planner.fly(polisher.hops(improve(polisher, chain))), unpolished=kept.unpolished)
+    better = planner.fly(polisher.hops(improve(polisher, chain)))
+    better = replace(better, unpolished=kept.unpolished, expanded=path.expanded, rounds=path.rounds)
     return better if better.cost < path.cost and rule.holds(better) else kept

@@ -92,6 +92,40 @@ class Leg:
 
 
 @dataclass(frozen=True)
+class Round:
+    """A round of refinement: new nodes every `spacing` [m] where they could help, the best route then.
+
+    `nodes` that were searched, the new ones among them, and `edges` between them; `travel_time` [s] and `cost` of
+    the best route so far; `gain`, the share of the cost that the round saved.
+    """
+
+    spacing: float
+    nodes: int
+    edges: int
+    travel_time: float
+    cost: float
+    gain: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the path file has it."""
+        return {
+            "spacing_m": self.spacing,
+            "nodes": self.nodes,
+            "edges": self.edges,
+            "travel_time_s": self.travel_time,
+            "cost": self.cost,
+            "gain": self.gain,
+        }
+
+    def told(self, number: int) -> str:
+        """A line for people."""
+        return (
+            f"  round {number}: nodes every {self.spacing:,.0f} m where they could help, {self.nodes:,} in all: "
+            f"{span(self.travel_time)}, {self.gain:.2%} gained"
+        )
+
+
+@dataclass(frozen=True)
 class Path:
     """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
 
@@ -101,7 +135,7 @@ class Path:
     begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
     `expanded`: the share of the nodes from which the search looked for legs, where it did.
     `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds and
-    what cost before it was polished.
+    what cost before it was polished. `rounds` of refinement that led to it.
 
     Examples:
         >>> path = road.query()
@@ -121,6 +155,7 @@ class Path:
     why: str = ""
     unthinned: tuple[int, float] | None = None
     unpolished: tuple[int, float, float] | None = None
+    rounds: tuple[Round, ...] = ()
     why_not: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
     departure: float | None = None
@@ -167,6 +202,7 @@ class Path:
             **energy,
             **thinned,
             **self._before_polishing(),
+            **({"rounds": [one.as_dict() for one in self.rounds]} if self.rounds else {}),
             **({} if self.departure is None else {"departure_s": self.departure, "frozen": self.frozen}),
             **({} if self.expanded is None else {"expanded_share": self.expanded}),
             **({} if self.found or not self.why else {"why": self.why}),
@@ -202,7 +238,8 @@ class Path:
             title += f", {cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         if self.frozen:
             title += f"; {FROZEN}"
-        return "\n".join([title, *(f"  {leg.told(self.departs)}" for leg in self.legs)])
+        rounds = [one.told(n) for n, one in enumerate(self.rounds, 1)]
+        return "\n".join([title, *rounds, *(f"  {leg.told(self.departs)}" for leg in self.legs)])
 
 
 def hops_of(path: Path) -> list[Hop]:
