@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV ?= .venv
 RUN = $(VENV)/bin
 
-.PHONY: install demo test lint types docs bench clean
+.PHONY: install demo test quick lint types docs bench clean
 
 install: $(VENV)/installed
 
@@ -23,6 +23,9 @@ demo: install
 
 test: install
 	$(RUN)/python -m pytest -n 2 --dist worksteal
+
+quick: install
+	$(RUN)/python -m pytest -m "not slow"
 
 lint: install
 	$(RUN)/python -m ruff check .

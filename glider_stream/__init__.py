@@ -61,10 +61,12 @@ _HOMES = {
     "search.query": ("Planner",),
     "search.surfacing": ("Surfacing",),
 }
-"""Where each name lives. It is loaded when it is first asked for: a start costs only what is used."""
+"""The module of each name. A name is loaded when it is first used, so that the start costs little."""
 _WHERE = {name: home for home, names in _HOMES.items() for name in names}
 
-if not TYPE_CHECKING:  # a type checker reads the imports above, and would take this for "any name, of any type"
+if (
+    not TYPE_CHECKING
+):  # a type checker reads the imports above; this function would tell it "any name, of any type"
 
     def __getattr__(name):
         if name == "__version__":

@@ -5,9 +5,9 @@ import signal
 
 
 def main() -> None:
-    """Run the command line, once nothing that happens meanwhile can end in a traceback."""
+    """Run the command line, after setting up what prevents tracebacks."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        # Ctrl-C while modules are loaded ends the process, as it ends any program
+        # Ctrl-C while modules are loaded ends the process, as in any program
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     open_streams()
     from .cli import main as run
@@ -16,15 +16,16 @@ def main() -> None:
 
 
 def open_streams() -> None:
-    """Open what the caller has closed of standard input, output and error.
+    """Open those of standard input, output and error that the caller has closed.
 
-    The next file that is opened would take its place, and what libraries write there would go into a roadmap.
+    Otherwise the next file that is opened would take their place, and output of libraries would go into a
+    roadmap.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one
+            os.open(os.devnull, os.O_RDWR)  # this takes the lowest free number, which is this one
 
 
 if __name__ == "__main__":

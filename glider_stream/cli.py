@@ -1,4 +1,4 @@
-"""The command line. Each command's body is one library call; nothing heavy is loaded before it is needed."""
+"""The command line. The body of each command is one library call; heavy modules are loaded only when needed."""
 
 import json
 import os
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def place(text: str, texts: int = 0) -> tuple[Any, ...]:
-    """Three numbers with commas between, then up to `texts` texts."""
+    """Return three numbers with commas between them, then up to `texts` texts."""
     parts = text.split(",")
     try:
         numbers = tuple(float(part) for part in parts[:3])
@@ -32,12 +32,12 @@ def place(text: str, texts: int = 0) -> tuple[Any, ...]:
 
 
 def place_and_time(text: str) -> tuple[Any, ...]:
-    """Three numbers, then a time if one is given."""
+    """Return three numbers and, if given, a time."""
     return place(text, texts=1)
 
 
 def key_and_value(text: str) -> tuple[str, Any]:
-    """A key, and its value: a number, or a text."""
+    """Return a key and its value: a number or a text."""
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE, such as units=cm/s")
@@ -67,7 +67,7 @@ def _write_json(value: Any) -> None:
 
 
 TRACE = "GLIDER_STREAM_TRACE"
-"""Name of the variable of the environment that shows the trace of an error of this program."""
+"""With this environment variable set, an error of this program shows its trace."""
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
@@ -76,7 +76,7 @@ ELSEWHERE = click.option(
     "overrides",
     multiple=True,
     metavar="SECTION.KEY=FILE",
-    help="Where a file of ROADMAP's scenario is now, such as flow.file=currents.nc.",
+    help="The new place of a file of ROADMAP's scenario, such as flow.file=currents.nc.",
 )
 
 
@@ -92,9 +92,13 @@ def cli() -> None:
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
 @click.option("--shard", metavar="K/N", help="Build only part K of N, for `merge`.")
-@click.option("--restart", is_flag=True, help="Discard what a stopped build has kept, and begin again.")
+@click.option("--restart", is_flag=True, help="Discard what a stopped build has kept, and start again.")
 @click.option(
-    "--from", "base", type=FILE, metavar="OLD", help="Reuse the legs that a new current cannot have changed."
+    "--from",
+    "base",
+    type=FILE,
+    metavar="OLD",
+    help="Reuse the legs of an older roadmap that the new current cannot have changed.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Evaluate on a Dask cluster; local:N for N processes here.")
 @click.option(
@@ -113,7 +117,7 @@ def build(
 ) -> None:
     """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
 
-    Results are kept beside the output until it is complete: the same command continues a stopped build.
+    Results are kept beside the output until it is complete. The same command continues a stopped build.
     """
     from . import planner
     from .base.progress import reporter
@@ -143,7 +147,7 @@ def build(
 @click.argument("parts", nargs=-1, required=True, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 def merge(parts: tuple[Path, ...], output: Path) -> None:
-    """Make one roadmap of PARTS, which `build --shard` wrote."""
+    """Merge PARTS, which `build --shard` wrote, into one roadmap."""
     from . import planner
 
     road = planner.merge(parts, output)
@@ -154,55 +158,74 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 
 ROUTE_OPTIONS = (
     click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic."),
-    click.option("--goal", type=place, metavar="X,Y,Z", help="As --start."),
+    click.option("--goal", type=place, metavar="X,Y,Z", help="The goal, in the same form as --start."),
     click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write."),
     click.option(
-        "--most-energy", type=float, metavar="J", help="The fastest that uses no more; cost must be energy."
+        "--most-energy",
+        type=float,
+        metavar="J",
+        help="The fastest path that uses no more; needs cost.kind = energy.",
     ),
-    click.option("--most-yos", type=int, help="Dives and climbs from one surfacing to the next, at most."),
-    click.option("--most-hours", type=float, help="Hours from one surfacing to the next, at most."),
     click.option(
-        "--polish", is_flag=True, help="Move the stops off the nodes, cut legs, count yos anew, while it pays."
+        "--most-yos", type=int, help="The most yos (a dive and a climb) from one surfacing to the next."
+    ),
+    click.option("--most-hours", type=float, help="The most hours from one surfacing to the next."),
+    click.option(
+        "--polish",
+        is_flag=True,
+        help="Move the stops off the nodes, cut legs, count yos anew, as long as the cost falls.",
     ),
     click.option(
         "--within",
         type=Percentage(),
         metavar="PERCENT",
-        help="Add nodes where they can help, in rounds, until a round gains less, such as 1%.",
+        help="Add nodes where they can help, in rounds, until a round gains less than this, such as 1%.",
     ),
     click.option(
-        "--seconds", type=float, metavar="SECONDS", help="Refine as --within, as long as another round fits."
+        "--seconds", type=float, metavar="SECONDS", help="Add nodes, as long as another round fits this time."
     ),
     click.option(
-        "--thin", type=float, metavar="METRES", help="Join legs this near a straight line, where one glide can."
+        "--thin",
+        type=float,
+        metavar="METRES",
+        help="Join legs this near to a straight line, if one glide can do it.",
     ),
     click.option(
-        "--card", "as_card", is_flag=True, help="Print the pilot's card: over ground, currents, arrivals."
+        "--card", "as_card", is_flag=True, help="Print the pilot's card: speed over ground, currents, arrivals."
+    ),
+    click.option("--window-hours", type=float, metavar="H", help="Length of exported windows; 12 if not given."),
+    click.option("--waypoints", type=int, metavar="N", help="The most waypoints in a goto list; 8 if not given."),
+    click.option(
+        "--arrival-radius",
+        type=float,
+        metavar="METRES",
+        help="A waypoint is reached at this distance; 500 if not given, 200 for targets.",
     ),
     click.option(
-        "--window-hours", type=float, metavar="H", help="How long exported windows last; 12 if not given."
+        "--trade-off", "front", is_flag=True, help="Instead, list the paths that trade time against energy."
     ),
     click.option(
-        "--waypoints", type=int, metavar="N", help="Waypoints a goto list holds, at most; 8 if not given."
+        "--depart-between",
+        nargs=2,
+        metavar="A B",
+        help="Try departures between two times: seconds of the flow, or dates (UTC).",
     ),
     click.option(
-        "--arrival-radius", type=float, metavar="METRES", help="How near a waypoint is reached; 500, targets 200."
+        "--every",
+        type=float,
+        metavar="SECONDS",
+        help="With --depart-between: the time from one departure to the next.",
     ),
+    click.option("--arrive-by", metavar="T", help="Find the latest departure that arrives by this time."),
     click.option(
-        "--trade-off", "front", is_flag=True, help="Say what time costs in energy, path by path, instead."
+        "--figure", type=FILE, help="A figure of travel time and arrival against departure: PNG, SVG or PDF."
     ),
-    click.option(
-        "--depart-between", nargs=2, metavar="A B", help="Try departures: seconds of the flow, or times (UTC)."
-    ),
-    click.option("--every", type=float, metavar="SECONDS", help="With --depart-between: how far they lie apart."),
-    click.option("--arrive-by", metavar="T", help="Find the latest departure that arrives by a time."),
-    click.option("--figure", type=FILE, help="Travel time and arrival against departure: PNG, SVG or PDF."),
     JSON,
 )
 
 
 def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of what finds a route."""
+    """Add the options of commands that find a route."""
     for option in reversed(ROUTE_OPTIONS):
         command = option(command)
     return command
@@ -213,7 +236,7 @@ def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @ELSEWHERE
 @route_options
 def query(roadmap: Path, overrides: tuple[str, ...], **asked: Any) -> None:
-    """Find the cheapest path in ROADMAP; without --start and --goal, between the scenario's own."""
+    """Find the cheapest path in ROADMAP, from --start to --goal or between the scenario's own points."""
     from .opened import open
 
     _answer(lambda: open(roadmap, overrides), **asked)
@@ -254,7 +277,7 @@ def _answer(
     figure: Path | None,
     as_json: bool,
 ) -> None:
-    """Print what was asked for of a roadmap or a scenario; exit code 1 where there is no path."""
+    """Print the answer of a roadmap or a scenario; exit code 1 if no path exists."""
     from .opened import split_outputs
     from .search.surfacing import Surfacing
 
@@ -268,18 +291,18 @@ def _answer(
     alone = not (outputs or polish or refines or asked or as_card) and most_energy is None and thin is None
     if front and (departures or not alone):
         raise click.UsageError(
-            "--trade-off goes with none of --output, --most-energy, --polish, --within, --seconds, --thin, "
-            "--card, --window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave "
-            "some out"
+            "--trade-off cannot be used with --output, --most-energy, --polish, --within, --seconds, --thin, "
+            "--card, --window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one "
+            "of them out"
         )
     if departures and not alone:
         raise click.UsageError(
-            "--depart-between and --arrive-by go with none of --output, --most-energy, --polish, --within, "
+            "--depart-between and --arrive-by cannot be used with --output, --most-energy, --polish, --within, "
             "--seconds, --thin, --card, --window-hours, --waypoints and --arrival-radius; set query.departure to "
-            "what they find"
+            "the departure that they find"
         )
     if not departures and (every is not None or figure is not None):
-        raise click.UsageError("--every and --figure go with --depart-between or --arrive-by; add one of them")
+        raise click.UsageError("--every and --figure need --depart-between or --arrive-by; add one of them")
     if front:
         corners = opened().trade_off(start, goal, surfacing=rule)
         answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
@@ -317,11 +340,11 @@ def _answer(
 @cli.command()
 @ROADMAP
 @click.option(
-    "--diff", "other", type=FILE, metavar="OTHER", help="Say what differs from another roadmap instead."
+    "--diff", "other", type=FILE, metavar="OTHER", help="Instead, show what differs from another roadmap."
 )
 @JSON
 def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
-    """Say what ROADMAP holds."""
+    """Show what ROADMAP holds."""
     from . import planner
 
     answer = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
@@ -334,7 +357,13 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
 @cli.command()
 @ROADMAP
 @ELSEWHERE
-@click.option("--sample", type=int, default=200, show_default=True, help="Edges for DOP853; 0 for all.")
+@click.option(
+    "--sample",
+    type=int,
+    default=200,
+    show_default=True,
+    help="The number of edges to fly with the integrator DOP853; 0 for all.",
+)
 @JSON
 def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool) -> None:
     """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if a leg differs."""
@@ -353,10 +382,14 @@ def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool
 @ROADMAP
 @ELSEWHERE
 @click.argument("paths", nargs=-1, type=FILE)
-@click.option("-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for a page of a route.")
+@click.option(
+    "-o", "--output", required=True, type=FILE, help="PNG, SVG or PDF; HTML for an interactive page of a route."
+)
 @click.option("--depth", "depths", multiple=True, type=float, help="Depth [m] of a map; up to 4 for one route.")
-@click.option("--chart", is_flag=True, help="The route by time on one map, its depth, heading and speeds.")
-@click.option("--fronts", type=float, metavar="HOURS", help="A chart, with what is reached every HOURS.")
+@click.option("--chart", is_flag=True, help="Draw the route by time on one map, with depth, heading and speeds.")
+@click.option(
+    "--fronts", type=float, metavar="HOURS", help="Draw a chart with lines of what can be reached every HOURS."
+)
 def plot(
     roadmap: Path,
     overrides: tuple[str, ...],
@@ -375,8 +408,7 @@ def plot(
     if len(paths) > 1:
         if chart or fronts is not None or len(depths) > 1:
             raise click.UsageError(
-                "several routes go with one --depth, and without --chart and --fronts; leave these out, or "
-                "give one route"
+                "several routes need one --depth, and no --chart or --fronts; leave these out, or give one route"
             )
         planner.plot_routes(roadmap, paths, output, depths[0] if depths else None, overrides=overrides)
     else:
@@ -392,7 +424,7 @@ def plot(
     multiple=True,
     type=place_and_time,
     metavar="LON,LAT,DEPTH[,TIME]",
-    help="Sample the current here.",
+    help="Show the current at this place.",
 )
 @click.option(
     "--name",
@@ -400,13 +432,13 @@ def plot(
     multiple=True,
     type=key_and_value,
     metavar="KEY=VALUE",
-    help="What the files do not say, as in [flow.names]: u, v, lon, lat, depth, time, units, rotate, ...",
+    help="A setting for what the files do not hold, as in [flow.names]: u, v, lon, lat, depth, time, units, ...",
 )
 @JSON
 def describe(
     currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
 ) -> None:
-    """Say what the current files CURRENTS hold, and how the planner reads them."""
+    """Show what the current files CURRENTS hold, and how the planner reads them."""
     from . import planner
 
     description = planner.describe(currents, [(*place, None)[:4] for place in at], dict(names))
@@ -420,7 +452,12 @@ def describe(
 @ROADMAP
 @ELSEWHERE
 @click.argument("route", nargs=-1, required=True, type=FILE)
-@click.option("--start", type=place, metavar="X,Y,Z", help="Where the vehicle is, before ROUTE; as for `query`.")
+@click.option(
+    "--start",
+    type=place,
+    metavar="X,Y,Z",
+    help="The vehicle's position before ROUTE, in the same form as for `query`.",
+)
 @JSON
 def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], start: Any, as_json: bool) -> None:
     """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails.
@@ -440,38 +477,40 @@ def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], st
 
 @cli.command()
 @click.argument("files", nargs=-1, required=True, type=FILE)
-@click.option("--waypoints", type=int, default=8, show_default=True, help="Waypoints a goto list may hold.")
+@click.option("--waypoints", type=int, default=8, show_default=True, help="The most waypoints in a goto list.")
 @JSON
 def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
-    """Look for faults in FILES that vehicles fly: goto lists, yo files, targets; exit code 1 if there are any."""
+    """Check FILES that vehicles fly (goto lists, yo files, targets); exit code 1 if there are faults."""
     from . import planner
 
     looked = planner.lint(files, waypoints)
     if as_json:
-        _write_json([one.as_dict() for one in looked])
+        _write_json([result.as_dict() for result in looked])
     else:
         say("\n".join(map(str, looked)))
-    if any(one.faults for one in looked):
+    if any(result.faults for result in looked):
         sys.exit(1)
 
 
 @cli.command()
 @click.argument("dives", type=FILE)
-@click.option("--preset", default="seaglider", show_default=True, help="The vehicle to begin from, or slocum.")
+@click.option(
+    "--preset", default="seaglider", show_default=True, help="The vehicle to start from: seaglider or slocum."
+)
 @click.option(
     "--column",
     "columns",
     multiple=True,
     type=key_and_value,
     metavar="WHAT=COLUMN",
-    help="vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase: its column.",
+    help="The column of vertical, horizontal, pitch, glide_angle, buoyancy [cc], net_mass [kg] or phase.",
 )
-@click.option("-o", "--output", type=FILE, help="A TOML file for the [glider] section to write.")
+@click.option("-o", "--output", type=FILE, help="The TOML file to write, with the [glider] section.")
 @JSON
 def calibrate(
     dives: Path, preset: str, columns: tuple[tuple[str, Any], ...], output: Path | None, as_json: bool
 ) -> None:
-    """Fit buoyancy or drag of a vehicle, and its lift, to DIVES: a CSV file of what it flew."""
+    """Fit the buoyancy or drag and the lift of a vehicle to DIVES, a CSV file of its dives."""
     from . import planner
 
     found = planner.calibrate(
@@ -484,13 +523,13 @@ def calibrate(
 
 
 @cli.command()
-@click.option("--runs", type=int, help="How often each figure is measured; 5 if not given.")
-@click.option("--quick", is_flag=True, help="Small problems: to see that all of it runs.")
+@click.option("--runs", type=int, help="The number of measurements of each figure; 5 if not given.")
+@click.option("--quick", is_flag=True, help="Small problems, to check that everything runs.")
 @click.option("--only", multiple=True, metavar="PART", help="Only these parts, or problems of the suite.")
 @click.option("--suite", is_flag=True, help="Solve the named problems instead, by every method and baseline.")
 @click.option("--ompl", type=FILE, help="With --suite: a folder for logs that OMPL's tools read.")
 @click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
-@click.option("--against", type=FILE, help="A record: say what has moved since.")
+@click.option("--against", type=FILE, help="An older record: show what has changed since.")
 @click.option("--json", "output", type=FILE, help="The record to write.")
 def bench(
     runs: int | None,
@@ -502,7 +541,7 @@ def bench(
     against: Path | None,
     output: Path | None,
 ) -> None:
-    """Measure what this machine does, or how good routes are; nothing else may run meanwhile."""
+    """Measure the speed of this machine, or the quality of routes; let nothing else run meanwhile."""
     from . import planner
 
     if suite:
@@ -531,11 +570,14 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line: exit code 0 done, 1 the honest no, 2 unusable input, 3 an error of this program."""
+    """Run the command line.
+
+    Exit codes: 0 done; 1 no path or a failed check; 2 unusable input; 3 an error of this program.
+    """
     if hasattr(sys.stdout, "reconfigure"):
-        # a name that is no UTF-8, or a letter that an old terminal lacks, is written as \\udcff
+        # a name that is not UTF-8, or a letter that an old terminal does not have, is written as \\udcff
         sys.stdout.reconfigure(errors="backslashreplace")
-    os.environ["MPLBACKEND"] = "agg"  # a notebook's own draws nothing into files
+    os.environ["MPLBACKEND"] = "agg"  # a notebook's own backend does not draw into files
     with stoppable():
         _run()
 
@@ -554,12 +596,12 @@ def _run() -> None:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         if error.filename is None:
-            silence(sys.stdout)  # what is written to files names them: this is standard output
+            silence(sys.stdout)  # errors of files have a name: this one is of standard output
         _refuse(f"{error.filename or 'standard output'} cannot be used: {reason}; name another")
     except MemoryError as error:
         _refuse(f"there is not enough memory ({error}); make the problem smaller")
     except (click.Abort, KeyboardInterrupt) as error:
-        # click makes an Abort of a KeyboardInterrupt
+        # click turns a KeyboardInterrupt into an Abort
         stopped = error.__cause__ if isinstance(error.__cause__, Stopped) else "stopped"
         say(f"glider-stream: {plain(str(stopped))}", error=True)
         sys.exit(STOPPED)
@@ -568,15 +610,15 @@ def _run() -> None:
             raise
         what = " ".join(f"{type(error).__name__}: {error}".split())
         say(
-            f"glider-stream: an error of this program, and not of your input: {what}; "
-            f"please report it, with what {TRACE}=1 in the environment shows",
+            f"glider-stream: this is an error of the program, not of your input: {what}; "
+            f"please report it, with the output that {TRACE}=1 in the environment gives",
             error=True,
         )
         sys.exit(3)
 
 
 def _show_warnings() -> None:
-    """Warnings on input in one line, without the place in this program."""
+    """Show warnings about input on one line, without the place in this program."""
     usual = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
@@ -589,7 +631,7 @@ def _show_warnings() -> None:
 
 
 def _check_environment() -> None:
-    """Numba answers a bad number of threads with a traceback, as soon as it is imported."""
+    """Raise InputError for a bad NUMBA_NUM_THREADS, for which Numba itself shows a traceback at import."""
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     fits = threads.isdecimal() and int(threads) > 0
     if not fits:

@@ -1,4 +1,4 @@
-"""An opened roadmap: roadmap, problem and searches, each made once, when it is first needed."""
+"""An opened roadmap: roadmap, problem and searches are each made once, when they are first needed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -56,21 +56,21 @@ def split_outputs(outputs: Sequence[str | File], refines: bool) -> tuple[list[st
 
 
 class OpenedScenario:
-    """A scenario and what its questions need; any number of threads may ask one at once.
+    """A scenario with all that its queries need; many threads may use it at once.
 
-    `scenario`, `problem` and `planner()`; these are made when they are first needed, and kept. Points are given
-    in the coordinates of the scenario's domain: x, y, z [m], z upward, or lon, lat [degrees], depth [m] where it
-    is geographic; None for the scenario's own start or goal.
+    `scenario`, `problem` and `planner()` are made when they are first needed, and kept. Points are in the
+    coordinates of the scenario's domain: x, y, z [m], z upward, or lon, lat [degrees], depth [m] if it is
+    geographic. None stands for the scenario's own start or goal.
     """
 
     def __init__(self, scenario: Scenario, title: str = "") -> None:
-        """A scenario at hand, whose legs are found as they are needed; figures have the `title`."""
+        """Keep a scenario, whose legs are found when they are needed; `title` is the title of figures."""
         self.title = title
         self._kept: dict[object, object] = {"scenario": scenario}
         self._lock = RLock()
 
     def _once(self, name: object, kind: type[T], make: Callable[[], T]) -> T:
-        """What is kept under a name, made by the first who asks for it; others wait."""
+        """Return the object that is kept under a name; the first caller makes it, and others wait."""
         with self._lock:
             if name not in self._kept:
                 self._kept[name] = make()
@@ -84,15 +84,15 @@ class OpenedScenario:
         return self._once("scenario", Scenario, self._read_scenario)
 
     def _read_scenario(self) -> Scenario:
-        raise AssertionError("a scenario is at hand from the first")
+        raise AssertionError("the scenario is set at the start")
 
     @property
     def problem(self) -> Problem:
-        """The scenario made into objects: its water is read once."""
+        """The problem of the scenario; its water is read once."""
         return self._once("problem", Problem, lambda: self.scenario.problem())
 
     def planner(self, surfacing: Surfacing | None = None) -> RoutePlanner:
-        """The planner whose paths keep a rule of surfacing, the scenario's own if None."""
+        """Return the planner whose paths keep a rule of surfacing; None stands for the scenario's own rule."""
         rule = self._surfacing if surfacing is None else surfacing
         return self._once(rule, RoutePlanner, lambda: planner_of(self.problem, self._roadmap, rule))  # type: ignore[type-abstract]
 
@@ -107,7 +107,7 @@ class OpenedScenario:
 
     @property
     def _surfacing(self) -> Surfacing:
-        """The scenario's own rule."""
+        """The scenario's own rule of surfacing."""
         query = self.scenario.query
         return Surfacing() if query is None else Surfacing(query.most_yos, query.most_hours)
 
@@ -128,17 +128,17 @@ class OpenedScenario:
         most_waypoints: int = MOST_WAYPOINTS,
         arrival_radius: float | None = None,
     ) -> Path:
-        """The cheapest path between two points, written to each of `outputs`.
+        """Return the cheapest path between two points, and write it to each of `outputs`.
 
-        `most_energy` [J] asks for the fastest of the paths of `trade_off` that uses no more. `polish` moves the
-        stops off the nodes, cuts legs and counts yos anew, as long as the cost falls. `within` refines: nodes are
-        added where they can help, in rounds, until one gains less than such a share of the cost, 0.01 for 1 %;
-        with `seconds` no round begins that would likely end later; `progress` is told of each. An output that
-        ends in .h5 is the roadmap with those nodes. `thin` [m] joins legs whose
-        stops lie so near the straight line, where one glide does, and none where that breaks another rule.
-        `surfacing` is a rule for how often to come up; the scenario's own if None. Exported windows last
-        `window_hours`, a goto list holds `most_waypoints`, and a waypoint is reached within `arrival_radius` [m],
-        each vehicle's usual one if None; `notes` of the path say what else became of files.
+        `most_energy` [J]: take the fastest of the paths of `trade_off` that uses no more. `polish`: move the
+        stops off the nodes, cut legs and count yos anew, as long as the cost falls. `within`: add nodes where
+        they can help, in rounds, until a round gains less than this share of the cost, 0.01 for 1 %. `seconds`:
+        add them, as long as another round likely fits this time. `progress` is told of each round. An output
+        that ends in .h5 is the roadmap with the new nodes. `thin` [m]: join legs whose stops lie this near to a
+        straight line, if one glide can do it and no other rule is broken. `surfacing`: a rule for how often to
+        come up; None stands for the scenario's own. Exported windows last `window_hours`, a goto list holds
+        `most_waypoints`, and a waypoint counts as reached within `arrival_radius` [m]; None stands for each
+        vehicle's usual value. The path's `notes` tell what else happened to files.
 
         Examples:
             >>> path = road.query((-190, 190, 0), (100, -100, -75), thin=20)
@@ -176,7 +176,7 @@ class OpenedScenario:
         return replace(path, notes=tuple(notes))
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none.
+        """Return the costs of the cheapest paths from n points to m others: (n, m), inf where no path exists.
 
         Examples:
             >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
@@ -197,7 +197,7 @@ class OpenedScenario:
     def trade_off(
         self, start: Point | None = None, goal: Point | None = None, *, surfacing: Surfacing | None = None
     ) -> TradeOff:
-        """Every path of one query that no other beats both in time and in energy; all else as in `query`.
+        """Return all paths of one query that no other path beats in both time and energy; see `query`.
 
         Examples:
             >>> energy = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
@@ -207,7 +207,7 @@ class OpenedScenario:
         return front(self.planner(surfacing), self._ends(start, goal))
 
     def card(self, path: Path) -> Card:
-        """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+        """Return the card of a route of this roadmap: speed over ground and currents, leg by leg.
 
         Examples:
             >>> print(road.card(road.query()))  # doctest: +ELLIPSIS
@@ -228,20 +228,22 @@ class OpenedScenario:
         """
         files = [route] if isinstance(route, str | File) else list(route)
         drawn = [read_drawn(file) for file in files]
-        # a rule of surfacing is the planner's, and what was drawn may begin or end anywhere
+        # a drawn route may begin or end anywhere, so it does not keep the rule of surfacing
         planner, domain = self.planner(Surfacing()), self.scenario.domain
         on_globe = isinstance(domain, GeographicDomain)
         cure = "and the roadmap is in metres; give x, y, z in a CSV file"
         points = [] if start is None else [self._point(start)]
-        for file, one in zip(files, drawn, strict=True):
-            require(on_globe or not one.geographic, f"the route {file} is in longitude and latitude, {cure}")
-            points += [domain.point(place) if one.geographic else np.array(place) for place in one.places]
-        require(len(points) > 1, f"the route {files[0]} holds one point; say with --start where the vehicle is")
+        for file, drawing in zip(files, drawn, strict=True):
+            require(on_globe or not drawing.geographic, f"the route {file} is in longitude and latitude, {cure}")
+            points += [domain.point(place) if drawing.geographic else np.array(place) for place in drawing.places]
+        require(
+            len(points) > 1, f"the route {files[0]} holds one point; give the vehicle's position with --start"
+        )
         for n, point in enumerate(points, 1 if start is None else 0):
             self.problem.check_point(point, f"point {n}" if n else "start")
-        notes = [note for one in drawn for note in one.notes]
+        notes = [note for drawing in drawn for note in drawing.notes]
         if start is None and drawn[0].of_vehicle:
-            notes.append("the way to its first point is not scored; say with --start where the vehicle is")
+            notes.append("the way to its first point is not scored; give the vehicle's position with --start")
 
         def later(start: Array, end: Array, since: float) -> Path:
             return planner.leaving(since).query(start, end)
@@ -266,24 +268,24 @@ class OpenedScenario:
         figure: str | File | None = None,
         surfacing: Surfacing | None = None,
     ) -> Departures:
-        """Arrival and travel time against departure: the best departure, the latest to `arrive_by` a time.
+        """Return arrival and travel time against departure: the best, and the latest to `arrive_by` a time.
 
-        Departures `between` two times, one `every` so many seconds; from the scenario's own on, until the time
-        to `arrive_by`, where none are given. Times are seconds of the flow, or ISO 8601 texts (UTC). Drawn where
-        `figure` says.
+        Departures lie `between` two times, one `every` so many seconds; if none are given, they begin at the
+        scenario's own and end at the time to `arrive_by`. Times are seconds of the flow, or ISO 8601 texts (UTC).
+        A figure is written to `figure`.
         """
         if figure is not None:
             from .plot import check_figure
 
             check_figure(figure)
         asked = between is not None or arrive_by is not None
-        require(asked, "give two times to depart between, or one to arrive by")
+        require(asked, "give two times to depart between, or a time to arrive by")
         planner, ends = self.planner(surfacing), self._ends(start, goal)
         require(not planner.assembly.frozen, "frozen paths hold for one departure; leave `query.frozen` out")
         problem = self.problem
         by = None if arrive_by is None else seconds(arrive_by, problem, "arrive-by")
         first, last = (problem.departure, by) if between is None else between
-        times = [seconds(one, problem, "depart-between") for one in (first, last) if one is not None]
+        times = [seconds(moment, problem, "depart-between") for moment in (first, last) if moment is not None]
         found = when_to_leave(
             lambda when: planner.leaving(when - problem.departure).query(*ends), times[0], times[-1], every, by
         )
@@ -302,11 +304,12 @@ class OpenedScenario:
         chart: bool = False,
         fronts: float | None = None,
     ) -> "Figure | None":
-        """Draw a path over the roadmap and the current at some `depths` [m], or the roadmap where there is none.
+        """Draw a path over the roadmap and the current at some `depths` [m], or the roadmap if no path is given.
 
-        A path file or object; up to four depths for a path, one for a roadmap or a `chart`, which shows a path
-        by time, with heading and speeds; `fronts` draws there what is reached every so many hours. Written
-        where `output` says; one that ends in .html is a page to look around in, and no figure is returned.
+        `path`: a path file or object. There are up to four depths for a path, one for a roadmap or a `chart`. A
+        chart shows a path by time, with heading and speeds; `fronts` also draws there what can be reached every
+        so many hours. The figure is written to `output`; if that ends in .html, it is an interactive page and
+        None is returned.
 
         Examples:
             >>> figure = road.plot(road.query(), "route.png", depths=[0, 75])
@@ -315,7 +318,7 @@ class OpenedScenario:
 
         check_drawing(output, path, depths, chart, fronts)
         route = path if path is None or isinstance(path, Path) else load_path(path)
-        free = self.planner(Surfacing())  # which has compared the water with the roadmap's
+        free = self.planner(Surfacing())  # this also compares the water with the roadmap's
         if route is None:
             cure = "draw a route over it, or build its roadmap"
             require(self._roadmap is not None, f"a scenario has no roadmap to draw; {cure}")
@@ -332,8 +335,8 @@ class OpenedScenario:
     ) -> "Figure":
         """Draw two to four paths of this water side by side, with their times, over the current at a `depth` [m].
 
-        `paths` are path files, which are called by their names without the ending, or paths by name. Without
-        a `depth` the middle of the box is drawn. The figure is written where `output` says.
+        `paths` are path files, which are named by their file names without the ending, or a dictionary of paths
+        by name. Without a `depth` it is the middle of the box. The figure is written to `output`.
 
         Examples:
             >>> paths = {"near": road.query(goal=(0, 0, -150)), "far": road.query()}
@@ -345,16 +348,16 @@ class OpenedScenario:
         routes = (
             dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_path(path) for path in paths}
         )
-        named = f"each path needs a name of its own; got {', '.join(map(str, paths))}; rename a file"
+        named = f"each path needs a different name; got {', '.join(map(str, paths))}; rename a file"
         require(len(routes) == len(paths), named)
-        self.planner(Surfacing())  # which compares the water with the roadmap's
+        self.planner(Surfacing())  # this also compares the water with the roadmap's
         return draw_routes(self.position, self.problem, routes, output, depth)
 
 
 class OpenedRoadmap(OpenedScenario):
-    """A roadmap and what its questions need, as `OpenedScenario`; `roadmap` is its data.
+    """A roadmap with all that its queries need, like `OpenedScenario`; `roadmap` holds its data.
 
-    InputError at the first question where flow, terrain or glider are no longer those that it was built with.
+    InputError at the first query if flow, terrain or glider differ from those that it was built with.
 
     Examples:
         >>> road = glider_stream.open("small.h5")
@@ -365,7 +368,7 @@ class OpenedRoadmap(OpenedScenario):
     """
 
     def __init__(self, roadmap: Roadmap, title: str = "") -> None:
-        """A roadmap at hand; figures have the `title`."""
+        """Keep a roadmap; `title` is the title of figures."""
         self.roadmap = roadmap
         self.title = title
         self._kept: dict[object, object] = {}
@@ -397,12 +400,12 @@ class OpenedRoadmap(OpenedScenario):
 
 
 def open(roadmap: str | File | Roadmap | OpenedRoadmap, overrides: Sequence[str] = ()) -> OpenedRoadmap:
-    """Open a roadmap, from its file or as it was built, for any number of questions.
+    """Open a roadmap (a file or an object) for any number of queries.
 
-    `overrides`, such as "flow.file=currents.nc", say where a file is now that its scenario reads; one that lies
+    `overrides`, such as "flow.file=currents.nc", give the new place of a file that the scenario reads; a file
     beside the roadmap is found without.
 
-    InputError where the file is not a roadmap, newer, incomplete or damaged.
+    InputError if the file is not a roadmap, or is newer, incomplete or damaged.
 
     Examples:
         >>> road = glider_stream.open("small.h5")
@@ -421,7 +424,7 @@ def open(roadmap: str | File | Roadmap | OpenedRoadmap, overrides: Sequence[str]
 
 
 def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()) -> OpenedScenario:
-    """Open a scenario (a file, a shipped name or an object), whose legs are found as they are needed."""
+    """Open a scenario (a file, a shipped name or an object), whose legs are found when they are needed."""
     if isinstance(scenario, Scenario):
         require(not overrides, f"overrides are for a scenario that is read from a file; got {list(overrides)}")
         return OpenedScenario(scenario)
@@ -431,9 +434,9 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
 def open_either(
     source: "str | File | Roadmap | Scenario | OpenedScenario", overrides: Sequence[str] = ()
 ) -> OpenedScenario:
-    """Open a roadmap, or a scenario: an object, a file that ends in .toml, or the name of a shipped one.
+    """Open a roadmap or a scenario: an object, a file (a scenario's ends in .toml), or a shipped name.
 
-    `overrides` as `open` or `open_scenario` has them.
+    `overrides`: see `open` and `open_scenario`.
     """
     if isinstance(source, OpenedRoadmap):
         return open(source, overrides)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from .water.ocean import Names
 
 AnyRoadmap = str | File | Roadmap | OpenedRoadmap
-"""A roadmap file's name, a roadmap, or an opened one, which keeps what questions need."""
+"""A roadmap: the name of its file, an object, or an opened one, which keeps what queries need."""
 
 
 def build(
@@ -55,12 +55,12 @@ def build(
     base: str | File | Roadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Roadmap:
-    """Build the roadmap of a scenario (a file, a shipped name or an object); write it where `output` says.
+    """Build the roadmap of a scenario (a file, a shipped name or an object), and write it to `output`.
 
-    A build into a file goes on where an earlier one of the same was stopped, or begins anew with `restart`;
-    every `checkpoint` [s], 30 if None, the disk is asked to keep what was found. `scheduler` is the address
-    of a Dask scheduler, or "local:N", whose workers evaluate; `base` an older roadmap of the same nodes in
-    another current, of which what that cannot have touched is taken over.
+    A build into a file continues an earlier one that was stopped; `restart` begins again. Every `checkpoint` [s]
+    (None: 30) the disk is asked to keep what was found. `scheduler`: the address of a Dask scheduler, or
+    "local:N", whose workers evaluate the nodes. `base`: an older roadmap of the same nodes in another current;
+    edges that the change cannot affect are taken from it.
 
     Examples:
         >>> road = planner.build("small.toml", "built.h5", overrides=["neighbours.k=10"])
@@ -135,7 +135,7 @@ def _build(
 
 
 def _resolved(scenario: str | File | Scenario, output: str | File | None, overrides: Sequence[str]) -> Scenario:
-    """The scenario to build, once it is known that its output can be written."""
+    """Return the scenario to build, after a check that its output can be written."""
     if output is not None:
         check_output(output)
     if isinstance(scenario, Scenario):
@@ -147,7 +147,7 @@ def _resolved(scenario: str | File | Scenario, output: str | File | None, overri
 
 
 def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
-    """Make one roadmap of parts that `build_part` wrote.
+    """Merge the parts that `build_part` wrote into one roadmap.
 
     Examples:
         >>> for shard in ("1/2", "2/2"):
@@ -161,7 +161,7 @@ def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
 
 
 def info(roadmap: AnyRoadmap) -> Roadmap:
-    """A roadmap from its file, which can be printed.
+    """Return a roadmap from its file; `print` shows it.
 
     Examples:
         >>> print(planner.info("small.h5"))  # doctest: +ELLIPSIS
@@ -172,7 +172,7 @@ def info(roadmap: AnyRoadmap) -> Roadmap:
 
 
 def differ(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
-    """The differences between two roadmaps, which can be printed.
+    """Return the differences between two roadmaps; `print` shows them.
 
     Examples:
         >>> fewer = planner.build("small.toml", overrides=["neighbours.k=10"])
@@ -197,9 +197,9 @@ def query(
     within: float | None = None,
     seconds: float | None = None,
 ) -> Path:
-    """The cheapest path between two points, see `OpenedRoadmap.query`.
+    """Return the cheapest path between two points; see `OpenedRoadmap.query`.
 
-    For several questions open the roadmap once: `glider_stream.open`.
+    For several queries open the roadmap once: `glider_stream.open`.
 
     Examples:
         >>> path = planner.query("small.h5", goal=(100, -100, -75), outputs=["path.json", "path.csv"])
@@ -238,7 +238,7 @@ def plan(
     within: float | None = None,
     seconds: float | None = None,
 ) -> Path:
-    """The cheapest path of a scenario without a roadmap; all else as in `query`.
+    """Return the cheapest path of a scenario, without a roadmap; see `OpenedRoadmap.query`.
 
     Examples:
         >>> path = planner.plan("small.toml", (-190, 190, 0), (100, -100, -75))
@@ -266,7 +266,7 @@ def trade_off(
     goal: Point | None = None,
     surfacing: Surfacing | None = None,
 ) -> TradeOff:
-    """Every path of one query that no other beats both in time and in energy; all else as in `query`.
+    """Return all paths of one query that no other path beats in both time and energy; see `query`.
 
     Examples:
         >>> road = planner.build("small.toml", overrides=["cost.kind=energy", "cost.preset=slocum"])
@@ -277,7 +277,7 @@ def trade_off(
 
 
 def card(roadmap: AnyRoadmap, path: Path) -> Card:
-    """What a route of this roadmap makes over ground, leg by leg, and what the water does to it.
+    """Return the card of a route of this roadmap: speed over ground and currents, leg by leg.
 
     Examples:
         >>> path = planner.query("small.h5")
@@ -290,7 +290,7 @@ def card(roadmap: AnyRoadmap, path: Path) -> Card:
 def score(
     roadmap: AnyRoadmap | Scenario, route: str | File | Sequence[str | File], start: Point | None = None
 ) -> Score:
-    r"""Fly a drawn route, from one file or several, in a roadmap's water, as `OpenedRoadmap.score` has it.
+    r"""Return the score of a drawn route (one file or several) in a roadmap's water; see `OpenedRoadmap.score`.
 
     Examples:
         >>> _ = pathlib.Path("drawn.csv").write_text("x,y,z\n-190,190,0\n-100,100,-75\n0,0,-150\n")
@@ -303,7 +303,7 @@ def score(
 
 
 def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> list[Linted]:
-    r"""What is wrong with vehicles' files: goto lists, of `most_waypoints` at most, yo files and targets.
+    r"""Return the faults of vehicles' files: goto lists (of at most `most_waypoints`), yo files and targets.
 
     Examples:
         >>> _ = pathlib.Path("goto_l10.ma").write_text("behavior_name=goto_list\n")
@@ -315,7 +315,7 @@ def lint(files: Sequence[str | File], most_waypoints: int = MOST_WAYPOINTS) -> l
 
 
 def why_no_edges(roadmap: AnyRoadmap) -> str:
-    """The reason, in a sentence, if a roadmap has no edge; empty if it has some.
+    """Return the reason, in one sentence, if a roadmap has no edge; empty if it has edges.
 
     Examples:
         >>> planner.why_no_edges("small.h5")
@@ -325,9 +325,9 @@ def why_no_edges(roadmap: AnyRoadmap) -> str:
 
 
 def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":
-    """Fly a roadmap file's legs again, a `sample` of them, 0 for all, by another integrator too.
+    """Fly the legs of a roadmap file again, and a `sample` of them (0: all) by another integrator.
 
-    `overrides` as `glider_stream.open` has them.
+    `overrides`: see `glider_stream.open`.
 
     Examples:
         >>> planner.verify("small.h5", sample=5).holds
@@ -339,9 +339,9 @@ def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] =
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
-    """Costs [s] of the cheapest paths from n points to m others: (n, m), inf where no path exists.
+    """Return the costs [s] of the cheapest paths from n points to m others: (n, m), inf where no path exists.
 
-    Points are given in the coordinates of the scenario's domain; see `query`.
+    Points are in the coordinates of the scenario's domain; see `query`.
 
     Examples:
         >>> planner.table("small.h5", [(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
@@ -360,7 +360,7 @@ def plot(
     fronts: float | None = None,
     overrides: Sequence[str] = (),
 ) -> "Figure | None":
-    """Draw a path over its roadmap or scenario, or the roadmap, as `OpenedRoadmap.plot` has it.
+    """Draw a path over its roadmap or scenario, or a roadmap; see `OpenedRoadmap.plot`.
 
     Examples:
         >>> path = planner.query("small.h5")
@@ -400,7 +400,7 @@ def plot_steering(
 ) -> "Figure":
     """Draw how legs are found from one point: its flow map at the goal's depth, and what each method finds.
 
-    Points are in the coordinates of the scenario's domain; any method may be chosen there.
+    Points are in the coordinates of the scenario's domain. The scenario may have any steering method.
 
     Examples:
         >>> figure = planner.plot_steering("small.toml", (-190, 190, 0), (0, 0, -150), "steering.png")
@@ -414,7 +414,10 @@ def plot_steering(
     ends = [resolved.domain.point(end) for end in (start, goal)]
     for end, name in zip(ends, ("start", "goal"), strict=True):
         problem.check_point(end, name)
-    require(ends[0][2] != ends[1][2], "start and goal lie at the same depth; a leg changes it")
+    require(
+        ends[0][2] != ends[1][2],
+        "start and goal lie at the same depth; give another depth, because a leg changes its depth",
+    )
     figure = plot_steering(problem, node_positions(problem), ends[0], ends[1])
     if output is not None:
         save_figure(figure, output)
@@ -426,10 +429,10 @@ def describe(
     at: Sequence["Place"] = (),
     names: "Names | Mapping[str, Any] | None" = None,
 ) -> "Description":
-    """What current files hold, and what the planner takes for what; the current at places `at`.
+    """Return what current files hold, how the planner reads them, and the current at places `at`.
 
-    A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None where there is but one.
-    `names` says what the files do not. InputError where they cannot be used.
+    A place is lon, lat [degrees], depth [m] and the time (ISO 8601, UTC), or None if there is only one time.
+    `names`: settings for what the files do not hold. InputError if they cannot be used.
 
     Examples:
         >>> description = planner.describe("currents.nc", at=[(18.5, 38.0, 100.0, None)])
@@ -451,7 +454,7 @@ def calibrate(
     preset: str = "seaglider",
     columns: Mapping[str, str] | None = None,
 ) -> "Calibration":
-    """Fit a preset to the dives of a CSV file; the scenario's [glider] section, written where `output` says.
+    """Return a preset fitted to the dives of a CSV file; its [glider] section is written to `output`.
 
     Examples:
         >>> calibration = planner.calibrate("dives.csv", "glider.toml")
@@ -480,11 +483,11 @@ def bench(
     ceiling: str | File | None = None,
     progress: "Callable[[benchmarks.Figure], None]" = lambda figure: None,
 ) -> "tuple[benchmarks.Record, list[str]]":
-    """Measure what this machine does: the record, and what has moved since the record `against`.
+    """Measure this machine: return the record, and what has changed since the record `against`.
 
-    The parts named in `only`, all if none, each figure `runs` times; `quick` measures small problems, to see
-    that all of it runs. `ceiling` is a program that the raw integrator is measured in turns with. Written as
-    JSON where `output` says.
+    `only`: the parts to measure (empty: all); each figure is measured `runs` times. `quick`: small problems, to
+    check that everything runs. `ceiling`: a program that takes turns with the raw integrator. The record is
+    written to `output` as JSON.
 
     Examples:
         >>> record, moved = planner.bench("record.json", runs=1, quick=True, only=["integrator"])
@@ -511,10 +514,10 @@ def suite(
     pairs: int = 20,
     progress: Callable[[str], None] = lambda message: None,
 ) -> "Report":
-    """Solve the suite's named problems, `only` some of them, by every method and baseline.
+    """Return the report on the suite's problems (`only`: some of them), solved by every method and baseline.
 
-    `pairs` random queries each; `quick`: few of all. Written as JSON where `output` says; a log per problem,
-    as OMPL's tools read them, into the folder `ompl`.
+    `pairs`: random queries for each. `quick`: a small run. The report is written to `output` as JSON, and a log
+    for each problem, which OMPL's tools read, into the folder `ompl`.
 
     Examples:
         >>> planner.suite(only=["atlantis"])  # doctest: +ELLIPSIS

@@ -1,4 +1,4 @@
-"""Scenarios: TOML into objects, every key checked; the problem that they make."""
+"""Scenarios: makes objects from TOML, checks every key, and builds the problem."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -53,7 +53,7 @@ OPTIONAL = ("terrain", "query")
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
 FILES = {key for keys in KEYS.values() for key in keys}
-"""Keys whose values name files."""
+"""The keys whose values are names of files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "flow": ("kind", {**FLOWS, "netcdf": OceanFlow}),
     "sampling": ("kind", SAMPLERS),
@@ -61,17 +61,17 @@ KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
     "steering": ("method", METHODS),
     "cost": ("kind", COSTS),
 }
-"""The sections that come in kinds: the key that selects, and its choices."""
+"""The sections with several kinds: the key that selects the kind, and its choices."""
 
 
 @dataclass(frozen=True)
 class QueryPoints:
-    """`start` and `goal` in the domain's coordinates; a route leaves at `departure` [s].
+    """The query: `start` and `goal` in the domain's coordinates; a route leaves at `departure` [s].
 
-    `most_yos` and `most_hours` from one surfacing to the next, if there is such a rule. In a flow that changes
-    each leg leaves when the last one arrives, but for `frozen`: then all meet the current of the departure.
-    `bins` [s]: ways to a node that arrive in different bins of time are kept side by side, where leaving later
-    may arrive earlier.
+    `most_yos` and `most_hours`: the most yos and hours from one surfacing to the next, or None. In a flow that
+    changes, each leg leaves when the last one arrives. With `frozen` all legs meet the current of the departure.
+    `bins` [s]: paths to a node that arrive in different bins of time are kept side by side, since a later
+    departure may arrive earlier.
     """
 
     start: Point
@@ -84,14 +84,14 @@ class QueryPoints:
 
     def __post_init__(self) -> None:
         fits = self.bins is None or 0 < self.bins <= LONGEST
-        require(fits, f"`query.bins` must be above 0 s, {LONGEST:g} at most; got {self.bins}")
+        require(fits, f"`query.bins` must be above 0 s and at most {LONGEST:g} s; got {self.bins}")
         fits = abs(self.departure) <= LONGEST
         require(fits, f"`query.departure` must be within {LONGEST:g} s of 0; got {self.departure:g}")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A problem as the TOML file describes it: one object for each section; `text` is the resolved TOML.
+    """A problem as the TOML file describes it: one object for each section; `text` is the complete TOML.
 
     Examples:
         >>> scenario = glider_stream.read_scenario("seed-box")
@@ -112,7 +112,7 @@ class Scenario:
     text: str
 
     def problem(self) -> Problem:
-        """Build flow, terrain and glide polar, and put everything together."""
+        """Return the problem: flow, terrain, glide polar, and all else that a search needs."""
         lo, hi = self.domain.box()
         table, frame = polar(self.glider), self.domain.frame()
         horizon = self.integration.dt * self.integration.steps
@@ -121,7 +121,7 @@ class Scenario:
         times = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
         within = known.t_lo <= self.departure <= known.t_hi
         require(within, f"`query.departure` = {self.departure:g} s lies outside {times}; choose one of them")
-        fast = f"the flow must have a current of {FASTEST:g} m/s at most; got {known.max_speed:g}; mend [flow]"
+        fast = f"the current of the flow must be at most {FASTEST:g} m/s; got {known.max_speed:g}: mend [flow]"
         require(known.max_speed <= FASTEST, fast)
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
         text += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
@@ -132,7 +132,7 @@ class Scenario:
             sampler = sampler.for_glide(float(table.best_angle.max()))
         if frame is not None and isinstance(self.domain, GeographicDomain):
             error = frame.scale_error(self.domain.lon, self.domain.lat)
-            text += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, off by up to {100 * error:.2g} %"
+            text += f"; metres about {frame.lon:.4g}, {frame.lat:.4g}, wrong by up to {100 * error:.2g} %"
         return Problem(
             evaluator=Evaluator(flow, terrain, table, self.method, self.integration, self.cost),
             sampler=sampler,
@@ -154,18 +154,18 @@ class Scenario:
 
     @property
     def departure(self) -> float:
-        """When gliders leave their nodes [s]."""
+        """The time when gliders leave their nodes [s]."""
         return 0.0 if self.query is None else self.query.departure
 
     def _departs(self) -> datetime | None:
-        """When gliders leave, by the calendar, where the flow says when t = 0 is."""
+        """The date when gliders leave (UTC), or None if the flow has no date."""
         if not isinstance(self.flow, OceanFlow) or self.flow.epoch is None:
             return None
         epoch = parse_time(self.flow.epoch, "`flow.epoch`").item()
         return cast(datetime, epoch).replace(tzinfo=UTC) + timedelta(seconds=self.departure)
 
     def _waters(self, glide: float, horizon: float) -> tuple[Flow, Terrain, str]:
-        """Flow and terrain; `glide` [m] is how far a glider gets in still water within the horizon [s]."""
+        """Return flow, terrain and a text on them; `glide` [m] is the way in still water within `horizon` [s]."""
         if isinstance(self.flow, OceanFlow):
             require(
                 isinstance(self.domain, GeographicDomain),
@@ -181,7 +181,7 @@ class Scenario:
         lo, hi = self.domain.box()
         flow = self.flow.kernel((lo[2], hi[2]))
         if self.flow.sampled is not None:
-            # no path between two nodes strays further from the box than half of what a leg can cover
+            # no path between two nodes leaves the box by more than half the length of the longest leg
             stray = (glide + flow.extent.max_speed * horizon) / 2
             x, y = ((lo[n] - stray, hi[n] + stray) for n in range(2))
             exact, flow = flow, sample_flow(flow, self.flow.sampled, x, y, (lo[2], hi[2]))
@@ -204,7 +204,7 @@ class Scenario:
         return flow, seabed, f"{text}; {also}"
 
     def _grounds(self, box: tuple[Array, Array], bottoms: list[Bottom]) -> tuple[Seabed, str]:
-        """The terrain of a geographic domain over a box [m], of what is known and what is asked for."""
+        """Return the terrain over a box [m] and a text on it: the known bottoms and the [terrain] section."""
         require(
             isinstance(self.domain, GeographicDomain),
             "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
@@ -222,7 +222,7 @@ class Scenario:
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package, by name.
+    """Return the scenarios that come with the package, by name.
 
     Examples:
         >>> "seed-box" in glider_stream.shipped_scenarios()
@@ -233,11 +233,11 @@ def shipped_scenarios() -> dict[str, Path]:
 
 
 def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
-    """A scenario from a TOML file, or a shipped one by its name.
+    """Return the scenario in a TOML file, or a shipped one by its name.
 
-    `overrides` are section.key=value each. Where they choose another kind of a section, the keys of the old
-    kind that the new one does not know are dropped, unless they are overridden, too. File names in the
-    scenario are relative to its folder, in overrides to the working directory.
+    `overrides` are texts section.key=value. If they choose another kind of a section, the keys of the old kind
+    that the new kind does not have are dropped, unless they are also overridden. File names in the scenario are
+    relative to its folder, those in overrides to the working folder.
 
     Examples:
         >>> scenario = glider_stream.read_scenario("seed-box", ["steering.method=flow-map"])
@@ -253,14 +253,14 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         f"the scenario {name} is neither a file nor a shipped scenario; choose a file, or one of: {shipped}",
     )
     try:
-        # some editors begin a file with a byte order mark
+        # some editors write a byte order mark at the start
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"the scenario {name} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as such") from None
+        raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as UTF-8") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"the scenario {name} is not valid TOML: {error}; mend that place") from None
+        raise InputError(f"the scenario {name} is not valid TOML: {error}; mend this place") from None
     check_depth(table, f"the scenario {name}")
     _override(table, overrides)
     check_depth(table, "`--set`")
@@ -268,7 +268,7 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def scenario_from_text(text: str) -> Scenario:
-    """The scenario that a roadmap carries."""
+    """Return the scenario from the text that a roadmap holds."""
     try:
         table = tomllib.loads(text)
         check_depth(table, "the roadmap's scenario")
@@ -278,7 +278,7 @@ def scenario_from_text(text: str) -> Scenario:
 
 
 def scenario_of(road: Roadmap) -> Scenario:
-    """The scenario that a roadmap carries, its files found again where they or the roadmap have moved."""
+    """Return the scenario that a roadmap holds; its files are found again if they or the roadmap have moved."""
     text = road.provenance.scenario
     try:
         table: dict[str, Any] = tomllib.loads(text)
@@ -300,7 +300,7 @@ def scenario_of(road: Roadmap) -> Scenario:
 
 
 def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
-    """Check every block; relative file names are relative to `folder`."""
+    """Return the scenario of a table, with every key checked; file names are relative to `folder`."""
     for name, block in table.items():
         require(name in SECTIONS, f"the section `{name}` is not known; choose from: {', '.join(SECTIONS)}")
         require(isinstance(block, Mapping), f"`{name}` must be a section, [{name}]; got {block!r}")
@@ -330,12 +330,12 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
 
 
 def _dated(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A section with TOML's bare dates as texts: `epoch = 2024-11-20T12:00:00` says what its text would."""
+    """Return a section with TOML's dates as texts, so that `epoch = 2024-11-20T12:00:00` needs no quotes."""
     return {key: value.isoformat() if isinstance(value, date) else value for key, value in table.items()}
 
 
 def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A table with its file names made absolute."""
+    """Return a table with absolute file names."""
     result = dict(table)
     for key in FILES & set(table):
         several = not isinstance(table[key], str)
@@ -343,9 +343,9 @@ def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         if isinstance(names, list) and all(isinstance(name, str) for name in names):
             found = [str((folder / name).absolute()) for name in names]
             for name in found:
-                # a roadmap keeps it as text
+                # a roadmap holds it as text
                 utf_8 = not any("\ud800" <= letter <= "\udfff" for letter in name)
-                require(utf_8, f"`{key}` = {name!r} is a name that is not UTF-8; rename the file, or its folder")
+                require(utf_8, f"`{key}` = {name!r} is not a name in UTF-8; rename the file or its folder")
             result[key] = found if several or key != "bathymetry" else found[0]
     return result
 
@@ -363,7 +363,7 @@ def _override(table: dict[str, Any], overrides: Sequence[str]) -> None:
 
 
 def _kind_keys(table: Mapping[str, Any], section: str) -> set[str]:
-    """The keys that the chosen kind of a section knows; none where the choice is not known."""
+    """Return the keys of a section's chosen kind; empty if the choice is unknown."""
     selector, kinds = KINDS[section]
     block = table.get(section)
     name = block.get(selector) if isinstance(block, dict) else None
@@ -372,7 +372,7 @@ def _kind_keys(table: Mapping[str, Any], section: str) -> set[str]:
 
 
 def _set(table: dict[str, Any], override: str) -> list[str]:
-    """Put a value, TOML or else a bare text, in its place, and return the place."""
+    """Set a value, which is TOML or else a plain text, and return its place."""
     place, equals, text = override.partition("=")
     keys = [key.strip() for key in place.split(".")]
     well = bool(equals) and len(keys) >= 2 and all(keys) and "\n" not in override

@@ -86,7 +86,8 @@ making = njit(**ARITHMETIC | {"_nrt": True})
 kernel = njit(**BARE)
 """Compiles a kernel that makes none, nor takes one that a callee has made."""
 inlined = njit(**BARE | {"inline": "always"})
-"""As `kernel`, and put in the place of its call."""
+"""Put in the place of its call, whatever it makes. A large kernel that is called once compiles sooner so: LLVM
+meets its instructions once, and not again in every caller up to the entry point."""
 shared = register_jitable(**BARE)
 """As `kernel` where a kernel calls it; Python runs it as it stands."""
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 from .cache import kernel
 
 
-class Cost(NamedTuple):
-    """`per_second` of a leg and `per_leg`, in the cost's own unit; travel time is 1 and 0."""
+class CostRates(NamedTuple):
+    """`per_second` of a leg and `per_leg`, in the unit of the cost; travel time is 1 and 0."""
 
     per_second: float
     per_leg: float

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .cache import inlined, kernel
 from .control import Polar, direction_of, vertical_speed
-from .cost import Cost
+from .cost import CostRates
 from .flow import Array, Flow, contains
 from .motion import Integration
 from .terrain import Terrain
@@ -43,7 +43,7 @@ class Medium(NamedTuple):
     terrain: Terrain
     polar: Polar
     integration: Integration
-    cost: Cost
+    cost: CostRates
 
 
 class Edge(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .cache import entry_point, kernel, making
+from .cache import entry_point, inlined, kernel, making
 from .control import angle_of_vertical_speed, control_towards, vertical_speed
 from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_for, hangar, place, rest
 from .flow import Array, Numbers
@@ -277,7 +277,7 @@ def controls_of_quarter(mesh, cell, quarter, corners):
     return Cell(angle, (cell[CELL_COLUMN] + left * half) * turn, da, half * turn)
 
 
-@kernel
+@inlined
 def fill_patches(look, quarter, k):
     """A quarter's patch at level k and, where nodes lie between levels, at the one before, or at the origin."""
     landing, corners, patches = look.mesh.landing, look.corners, look.patches
@@ -293,7 +293,7 @@ def fill_patches(look, quarter, k):
         patches[1, 4:] = 0.0
 
 
-@kernel
+@inlined
 def look_into_quarter(look, cell, quarter, may_halve, rows, count):
     """Guesses for the nodes under a quarter of a cell, as `guess_in_patch` has them.
 
@@ -335,7 +335,7 @@ def look_into_cell(look, cell, may_halve, quarters, rows, count):
     return waiting, count
 
 
-@making
+@inlined
 def look_into_cells(look, cells, first, last, may_halve, guesses):
     """Look into cells first..last - 1: (cells, how many there are now, guesses).
 
@@ -354,7 +354,7 @@ def look_into_cells(look, cells, first, last, may_halve, guesses):
     return cells, waiting, Guesses(rows, known)
 
 
-@making
+@inlined
 def fan_guesses(medium, steering, nodes, sweep, guesses, lanes):
     """First guesses for the wanted nodes that a sweep may pass over, added to the guesses that are there.
 

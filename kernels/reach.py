@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .cache import entry_point, kernel, making
+from .cache import entry_point, inlined, kernel, making
 from .connect import pair_at
 from .control import CLIMB, angle_of_vertical_speed, horizontal_speed, vertical_speed
 from .cost import edge_cost
@@ -405,7 +405,7 @@ def want(wanted, points, n, value):
             wanted[points.target[k]] = value
 
 
-@making
+@inlined
 def guesses_of_tasks(medium, steering, nodes, points, tasks, settled, lanes):
     """First guesses for the tasks that are not done, but for the nodes that are settled."""
     guesses = Guesses(np.empty((1024, GUESS_COLUMNS)), 0)

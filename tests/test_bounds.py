@@ -80,6 +80,7 @@ def test_the_ends_of_the_calendar(epoch):
         parse_time(epoch, "`flow.epoch`")
 
 
+@pytest.mark.slow
 def test_a_header_of_many_dots(place, capsys):
     text = Path("small.toml").read_text()
     dots = ".a" * 20_000
@@ -101,6 +102,7 @@ def star(count):
     return {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
 
 
+@pytest.mark.slow
 def test_polygons_are_bounded(place):
     pytest.importorskip("shapely")
     frame = LocalFrame(10.0, 40.0)

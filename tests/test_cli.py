@@ -143,6 +143,7 @@ def test_a_log_gets_a_line_now_and_then_and_at_the_end(capsys, monkeypatch):
     assert said.err.splitlines() == ["build: 1 of 10", "build: 3 of 10", "build: 10 of 10"]
 
 
+@pytest.mark.slow
 def test_a_terminal_gets_a_live_bar(tmp_path):
     roadmap()  # the kernels are compiled by now
     master, terminal = pty.openpty()

@@ -13,6 +13,8 @@ import glider_stream
 from glider_stream import planner
 from glider_stream.roadmap.store import write_roadmap
 
+pytestmark = pytest.mark.slow
+
 IN_KERNELS = {"Status"}
 """Their text is part of the key of the kernels' cache: an example there would compile all kernels anew."""
 DIVES = """\

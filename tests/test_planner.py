@@ -75,6 +75,7 @@ def test_info_is_the_command(tmp_path, capsys):
     assert json.loads(command(capsys, "info", file, "--json").out) == road.as_dict()
 
 
+@pytest.mark.slow
 def test_plot_is_the_command(tmp_path, capsys):
     file, path = tmp_path / "small.h5", tmp_path / "path.json"
     write_roadmap(roadmap(), file)

@@ -17,6 +17,8 @@ from glider_stream.roadmap.verify import verify
 from glider_stream.scenario import read_scenario
 from glider_stream.search.path import SURFACE
 
+pytestmark = pytest.mark.slow
+
 gpxpy, kml, shapely, pyproj = (
     pytest.importorskip(name) for name in ("gpxpy", "fastkml.kml", "shapely", "pyproj")
 )
@@ -50,7 +52,7 @@ def test_a_hundred_kilometres_and_its_files(tmp_path, monkeypatch, name):
     road = planner.build(scenario, "road.h5")
     if name == "washington":
         assert (
-            "names no depth: its current is taken as the surface's and held at all depths" in road.provenance.flow
+            "has no depth: its current is taken as the surface's and held at all depths" in road.provenance.flow
         )
         assert "changes with time, and legs hold for departure at 0 s" in road.provenance.flow
     path = planner.query("road.h5")

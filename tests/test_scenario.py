@@ -212,10 +212,10 @@ def test_a_number_is_no_file(tmp_path):
 @pytest.mark.parametrize(
     ("point", "said"),
     [
-        ((1.5, 91, 10), "no longitude and latitude"),
-        ((1.5, math.nan, 10), "no longitude and latitude"),
-        ((math.nan, 3.5, 10), "no longitude and latitude"),
-        ((4000, 3.5, 10), "no longitude and latitude"),
+        ((1.5, 91, 10), "not a longitude and a latitude"),
+        ((1.5, math.nan, 10), "not a longitude and a latitude"),
+        ((math.nan, 3.5, 10), "not a longitude and a latitude"),
+        ((4000, 3.5, 10), "not a longitude and a latitude"),
         ((1.5, 3.5, -10), "at least 0 m, downward; got -10"),
         ((1.5, 3.5, math.nan), "at least 0 m, downward; got nan"),
     ],

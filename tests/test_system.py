@@ -16,6 +16,8 @@ from glider_stream import planner
 from glider_stream.base import cores
 from glider_stream.base.terminal import plain
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "glider_stream"]
 
 

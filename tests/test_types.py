@@ -10,6 +10,8 @@ import pytest
 
 import glider_stream
 
+pytestmark = pytest.mark.slow
+
 EXPRESSIONS = {
     "glider_stream.read_roadmap('small.h5')": "glider_stream.roadmap.roadmap.Roadmap",
     "planner.build('seed-box')": "glider_stream.roadmap.roadmap.Roadmap",

@@ -1,1 +1,1 @@
-"""What every room stands on: errors, settings, checks, arrays, threads, progress, locks, outputs."""
+"""The base of all packages: errors, settings, checks, arrays, threads, progress, locks, outputs."""

@@ -6,6 +6,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 """Real numbers."""
 Index = NDArray[np.int64]
-"""Numbers of nodes, of edges, of rows."""
+"""Indices of nodes, edges or rows."""
 Bools = NDArray[np.bool_]
-"""Choices among rows."""
+"""Masks: which rows are chosen."""

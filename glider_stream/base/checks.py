@@ -1,4 +1,4 @@
-"""Bounds that hold in every scenario, and the checks that name what breaks them."""
+"""Bounds that hold in every scenario, and checks that name the value that breaks them."""
 
 from .settings import require
 
@@ -15,12 +15,12 @@ FASTEST = 100.0
 
 
 def check_range(bounds: Range, where: str) -> None:
-    """InputError unless lo < hi."""
+    """Raise InputError unless lo < hi and the range is not too wide."""
     require(bounds[0] < bounds[1], f"`{where}` must rise; got [{bounds[0]:g}, {bounds[1]:g}]")
     wide = bounds[1] - bounds[0] > WIDEST
     require(not wide, f"`{where}` must span {WIDEST:g} at most; got [{bounds[0]:g}, {bounds[1]:g}]")
 
 
 def require_positive(value: float, where: str) -> None:
-    """InputError unless the value is above zero."""
+    """Raise InputError unless the value is above zero."""
     require(value > 0, f"`{where}` must be above 0; got {value:g}")

@@ -1,4 +1,4 @@
-"""Times as people read them: the date and time in UTC where a departure is known, else hours."""
+"""Times as people read them: date and time in UTC if the departure is known, else hours."""
 
 from datetime import datetime, timedelta
 
@@ -6,17 +6,17 @@ HOUR = 3600.0
 
 
 def moment(departs: datetime | None, seconds: float) -> str:
-    """A time [s] after a departure: `2024-11-20 12:16Z` where that is known (UTC), else the hours since then."""
+    """Return a time [s] after a departure: `2024-11-20 12:16Z` (UTC) if that is known, else the hours."""
     if departs is None:
         return f"{hours(seconds)} h"
     return (departs + timedelta(seconds=seconds)).strftime("%Y-%m-%d %H:%MZ")
 
 
 def span(seconds: float) -> str:
-    """A length of time [s] in seconds and in hours."""
+    """Return a length of time [s] as text in seconds and in hours."""
     return f"{seconds:,.0f} s ({hours(seconds)} h)"
 
 
 def hours(seconds: float) -> str:
-    """Hours of a time [s]."""
+    """Return a time [s] as text in hours."""
     return f"{seconds / HOUR:,.2f}"

@@ -1,4 +1,4 @@
-"""How many cores this process may use: fewer than the machine has under taskset, in containers, on clusters."""
+"""The number of cores that this process may use; taskset, containers and clusters may limit it."""
 
 import math
 import os
@@ -7,11 +7,11 @@ from functools import cache
 from pathlib import Path
 
 GROUPS = Path("/sys/fs/cgroup")
-"""Where Linux shows the limits of groups of processes."""
+"""The folder in which Linux shows the limits of groups of processes."""
 
 
 def usable_cores() -> int:
-    """NUMBA_NUM_THREADS where the user has set it; else what affinity and the group's share of time allow."""
+    """Return NUMBA_NUM_THREADS if the user has set it, else what affinity and the group's limit allow."""
     asked = os.environ.get("NUMBA_NUM_THREADS", "")
     if asked.isdecimal() and int(asked) > 0:
         return int(asked)
@@ -24,7 +24,7 @@ def usable_cores() -> int:
 
 @cache
 def _share() -> float:
-    """Cores' worth of time that the group of this process gets, inf without a limit."""
+    """Return the number of cores that the group of this process may use; inf without a limit."""
     try:
         lines = Path("/proc/self/cgroup").read_text().splitlines()
     except OSError:
@@ -33,7 +33,10 @@ def _share() -> float:
 
 
 def _shares(lines: list[str], groups: Path) -> Iterator[float]:
-    """The limits of a group and of all above it; `lines` of /proc/self/cgroup: number:controllers:path."""
+    """Yield the limits of a group and of all groups above it.
+
+    `lines` of /proc/self/cgroup: number:controllers:path.
+    """
     for line in lines:
         _, controllers, path = [*line.split(":", 2), "", ""][:3]
         if controllers == "":
@@ -43,12 +46,12 @@ def _shares(lines: list[str], groups: Path) -> Iterator[float]:
         else:
             continue
         here = top / path.strip("/")
-        # within a container the path may be that of the host, and only the top is there
+        # within a container the path may be the host's, and only the top of it exists
         for folder in {top, here, *(parent for parent in here.parents if top in parent.parents)}:
             try:
-                words = (folder / quota).read_text().split()
-                words += (folder / period).read_text().split() if period else []
-                limit, each = float(words[0]), float(words[1])
+                numbers = (folder / quota).read_text().split()
+                numbers += (folder / period).read_text().split() if period else []
+                limit, each = float(numbers[0]), float(numbers[1])
             except (OSError, ValueError, IndexError):
                 continue  # no file, or "max"
             if limit > 0 and each > 0:

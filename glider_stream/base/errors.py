@@ -14,11 +14,11 @@ class InputError(ValueError):
 
 
 class InputWarning(UserWarning):
-    """Input that can be used, though it may not say what was meant; the message is one sentence."""
+    """Input that can be used but may not be what the user meant; the message is one sentence."""
 
 
 class Unwritable(InputError):
-    """An output that cannot be written whole, as on a full disk."""
+    """An output that cannot be written whole, for example on a full disk."""
 
 
 class Stopped(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""Ctrl-C: the first stops the work and keeps what was found, the second ends the process at once."""
+"""Ctrl-C: the first stops the work and keeps what was found; the second ends the process at once."""
 
 import contextlib
 import os
@@ -10,18 +10,18 @@ from collections.abc import Iterator
 from .terminal import Murmur
 
 PATIENCE = 1.0
-"""Seconds after which a stop that takes longer is explained."""
+"""A stop that takes longer than this [s] is explained."""
 STOPPED = 130
 """The exit code of a program that Ctrl-C has stopped: 128 and the signal's number."""
 
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt in the block, and a second one end the process whatever it does.
+    """Let Ctrl-C raise KeyboardInterrupt in the block; a second Ctrl-C ends the process in any state.
 
-    Python answers a signal between two of its own steps alone, and a compiled kernel may take minutes. A thread
-    of its own is told of each signal by the system; kernels leave it the interpreter. Where the program does
-    not answer to Ctrl-C, as under nohup, it stays so.
+    Python handles a signal only between two of its own steps, and a compiled kernel may take minutes. So a thread
+    is told of each signal by the system; it can run because kernels release the interpreter. If the program
+    ignores Ctrl-C, for example under nohup, it continues to do so.
     """
     main = threading.current_thread() is threading.main_thread()
     before = signal.getsignal(signal.SIGINT)
@@ -44,19 +44,19 @@ def stoppable() -> Iterator[None]:
 
 
 def _watch(ours: socket.socket) -> None:
-    """Count the signals until the other end closes."""
+    """Count the signals until the other end is closed."""
     count = 0
     with ours:
         while True:
             try:
-                told = ours.recv(64)
+                received = ours.recv(64)
             except TimeoutError:
                 Murmur().write("glider-stream: stopping; press Ctrl-C again to end it at once\n")
                 ours.settimeout(None)
                 continue
-            if not told:
+            if not received:
                 return
-            count += told.count(signal.SIGINT)
+            count += received.count(signal.SIGINT)
             if count >= 2:
                 if Murmur().isatty():
                     Murmur().write("\x1b[?25h")  # a progress bar hides the cursor

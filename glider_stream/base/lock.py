@@ -1,4 +1,4 @@
-"""A lock on an output: one build at a time writes it."""
+"""A lock on an output: only one build at a time writes it."""
 
 import contextlib
 import json
@@ -15,15 +15,15 @@ from .errors import InputError
 from .output import is_running
 
 ENDING = ".glider-stream.lock"
-"""Of a lock's name. Other programs keep files such as poetry.lock, which are no locks and not ours."""
+"""The ending of a lock's name. Other programs have files such as poetry.lock, which are not locks of ours."""
 
 
 @contextlib.contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """Hold the lock beside an output for as long as the block runs; InputError, naming the holder, if taken.
+    """Hold the lock beside an output during the block; InputError, naming the holder, if it is taken.
 
-    The system's own lock on the file, which ends with its process: what a killed build leaves is no obstacle.
-    On a file system without locks, the file itself is the lock: see `_claimed`.
+    It is the system's own lock on the file and ends with its process, so a killed build leaves no lock behind. On
+    a file system without locks the file itself is the lock: see `_claimed`.
     """
     path = output.with_name(f"{output.name}{ENDING}")
     while True:
@@ -43,13 +43,15 @@ def locked(output: Path) -> Iterator[None]:
             with _claimed(output, path):
                 yield
             return
-        # whoever held it may have removed the file since it was opened
+        # the last holder may have removed the file after it was opened
         with contextlib.suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(handle), os.stat(path)):
                 break
         os.close(handle)
     try:
-        with contextlib.suppress(OSError):  # who holds it is a courtesy, which a full disk may not stop
+        with contextlib.suppress(
+            OSError
+        ):  # the holder's name is only information, so a full disk does not matter
             os.ftruncate(handle, 0)
             os.write(handle, _myself())
         yield
@@ -61,10 +63,10 @@ def locked(output: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _claimed(output: Path, path: Path) -> Iterator[None]:
-    """As `locked`, where the file system has no locks: the name of the lock is taken by who makes it first.
+    """Hold the lock on a file system without locks: the process that makes the lock's name first has it.
 
-    A hard link to a file of one's own is made whole or not at all, on network file systems, too. A build of
-    this machine that has ended is no obstacle; one of another machine may still run, and only a person knows.
+    A hard link to a file of our own is made whole or not at all, also on network file systems. A lock of a build
+    that has ended on this machine is removed. A lock of another machine stays, because its build may still run.
     """
     mine = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}")
     try:
@@ -86,15 +88,15 @@ def _claimed(output: Path, path: Path) -> Iterator[None]:
 
 def _remove_stale(output: Path, path: Path, aside: Path) -> None:
     """Remove a lock whose holder has ended; InputError, naming the holder, if it may still run."""
-    with contextlib.suppress(FileNotFoundError):  # its holder may have just removed it
+    with contextlib.suppress(FileNotFoundError):  # its holder may have removed it just now
         before = path.read_bytes()
         holder = _read(before)
-        # an empty file is what the attempt at a true lock leaves
+        # the attempt at a system lock leaves an empty file
         ended = holder.get("machine") == platform.node() and not is_running(int(holder["process"]))
         if holder and not ended:
             cure = f"or remove {path} if that build has ended, since this disk has no locks"
             raise InputError(f"{_taken(output, holder)}, {cure}")
-        # moved, then looked at again: two builds may find the same stale lock at once
+        # move it, then check again: two builds may find the same old lock at once
         os.rename(path, aside)
         if aside.read_bytes() != before:
             with contextlib.suppress(OSError):
@@ -103,7 +105,7 @@ def _remove_stale(output: Path, path: Path, aside: Path) -> None:
 
 
 def _linked(mine: Path, path: Path) -> bool:
-    """Whether the lock's name is now ours; made anew where the file system has no hard links either."""
+    """Return whether the lock's name is now ours; without hard links the file is made directly."""
     try:
         os.link(mine, path)
     except FileExistsError:
@@ -124,10 +126,14 @@ def _myself() -> bytes:
 
 
 def _read(text: bytes) -> dict[str, Any]:
-    """Who holds a lock; empty where it does not say so."""
+    """Return the holder in a lock's text; empty if the text names none."""
     try:
-        told = json.loads(text)
-        return {"process": int(told["process"]), "machine": str(told["machine"]), "since": str(told["since"])}
+        holder = json.loads(text)
+        return {
+            "process": int(holder["process"]),
+            "machine": str(holder["machine"]),
+            "since": str(holder["since"]),
+        }
     except (ValueError, TypeError, KeyError, RecursionError):
         return {}
 
@@ -141,7 +147,7 @@ def _holder(handle: int) -> dict[str, Any]:
 
 
 def _taken(output: Path, holder: dict[str, Any]) -> str:
-    who = "which has not said who it is"
+    who = "which has not written its name"
     if holder:
         who = f"process {holder['process']} on {holder['machine']} since {holder['since']}"
     return f"another build of {output} is running, {who}; wait for it, or name another"

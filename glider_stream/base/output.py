@@ -1,4 +1,4 @@
-"""Outputs: whether one can be written, and how it is replaced whole or not at all."""
+"""Outputs: checks whether a file can be written, and replaces it whole or not at all."""
 
 import contextlib
 import os
@@ -12,18 +12,18 @@ from .errors import InputError, Unwritable
 from .settings import require
 
 MARKER = "glider-stream"
-"""In the name of every temporary file that we make, so that no other file is taken for one."""
+"""This text is in the name of each of our temporary files, so that no other file is taken for one."""
 
 LONGEST_NAME = 200
-"""Bytes in an output's name: what is kept beside it has a longer one, and 255 is what file systems take."""
+"""An output's name may have this many bytes; files beside it have longer names, and file systems allow 255."""
 
 
 def check_output(path: str | Path) -> None:
-    """InputError unless a file can be made at `path`: before the work, not after it."""
+    """Raise InputError unless a file can be made at `path`; this is checked before the work begins."""
     path = Path(path)
     size = len(os.fsencode(path.name))
     fits = size <= LONGEST_NAME
-    require(fits, f"the name of the output {path} is {size} bytes long; name one of at most {LONGEST_NAME}")
+    require(fits, f"the name of the output {path} is {size} bytes long; give a name of at most {LONGEST_NAME}")
     try:
         path.stat()
     except FileNotFoundError:
@@ -42,12 +42,12 @@ def check_output(path: str | Path) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`, moved into its place when the block ends well, else removed.
+    """Yield a temporary name beside `path`; it is moved to `path` if the block ends well, else removed.
 
-    What the block cannot write, as where the disk is full, is an InputError that names `path`.
+    InputError that names `path` if the block cannot write, for example on a full disk.
     """
     check_output(path)
-    target = path.resolve()  # a link stays one
+    target = path.resolve()  # a link stays a link
     before, after = f".{target.name}.{os.getpid()}-", f".{MARKER}{target.suffix}"
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=before, suffix=after)
     os.close(handle)
@@ -56,7 +56,7 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         with temporary.open("rb") as whole:
             os.fsync(whole.fileno())
-        # only the owner may read what mkstemp makes; an output is as readable as any new file
+        # only the owner may read a file of mkstemp; an output gets the permissions of any new file
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
@@ -70,10 +70,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def remove_abandoned(target: Path) -> None:
-    """Remove the temporary files of an output that processes left which were killed in their last moment.
+    """Remove the temporary files of an output that killed processes left.
 
-    Only regular files whose names `replacing` makes for this output, and none of a process that still runs
-    here. The caller holds the output's lock, so that no build on another machine writes one now.
+    Only regular files with the names that `replacing` makes for this output are removed, and no file of a process
+    that still runs here. The caller holds the output's lock, so no build on another machine writes one now.
     """
     name, ending = re.escape(target.name), re.escape(f".{MARKER}{target.suffix}")
     form = re.compile(rf"\.{name}\.(\d+)-[a-z0-9_]{{8}}{ending}")
@@ -81,7 +81,7 @@ def remove_abandoned(target: Path) -> None:
         left = [(entry, match) for entry in entries if (match := form.fullmatch(entry.name))]
     for entry, match in left:
         process = int(match[1])
-        # in a container, a build that is begun again often has the number of the one before
+        # in a container, a build that starts again often has the process number of the build before
         over = process == os.getpid() or not is_running(process)
         with contextlib.suppress(OSError):  # Windows keeps a file that is open
             if over and stat.S_ISREG(entry.stat(follow_symlinks=False).st_mode):
@@ -89,7 +89,7 @@ def remove_abandoned(target: Path) -> None:
 
 
 def is_running(process: int) -> bool:
-    """Whether another process of this machine has that number; where the system does not tell, no."""
+    """Return whether another process of this machine has that number; False if the system does not tell."""
     if os.name == "nt" or not 0 < process < 2**31:
         return False
     try:

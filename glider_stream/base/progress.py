@@ -1,4 +1,4 @@
-"""Progress on standard error: a live bar on a terminal, a line now and then in a log."""
+"""Progress on standard error: a live bar on a terminal, a line from time to time in a log."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ LOG_EVERY = 10.0
 
 @contextmanager
 def reporter(what: str) -> Iterator[Callable[[Any], None]]:
-    """A callable that shows a `Progress`, for as long as the block runs."""
+    """Yield a function that shows a `Progress`, during the block."""
     if not Murmur().isatty():
         last = -LOG_EVERY
 

@@ -1,7 +1,7 @@
-"""Frozen settings objects made from TOML tables: every key is checked, and no value is guessed.
+"""Frozen settings objects from TOML tables: every key is checked, and no value is guessed.
 
-A block of a scenario is a frozen dataclass: a field without a default is a required key, its annotation is
-the key's type, its `__post_init__` checks the value. A new kind is one dataclass and one table row.
+A block of a scenario is a frozen dataclass. A field without a default is a required key, its annotation is the
+type of the key, and `__post_init__` checks the value. A new kind is one dataclass and one row of a table.
 """
 
 import sys
@@ -16,7 +16,7 @@ from .errors import InputError
 T = TypeVar("T")
 LARGEST_FLOAT = sys.float_info.max
 LARGEST_INT = 2**53
-"""Whole numbers up to this one are exact as floats, too; TOML has no limit."""
+"""Whole numbers up to this limit are also exact as floats; TOML has no limit."""
 
 
 def _described(kind: Any) -> str:
@@ -56,7 +56,7 @@ def _fits(value: Any, kind: Any, where: str) -> Any:
         if isinstance(value, Mapping):
             return from_table(typing.cast(type, kind), value, where)
     elif kind is float:
-        # False for NaN, too
+        # also False for NaN
         if not isinstance(value, bool) and isinstance(value, (int, float)) and abs(value) <= LARGEST_FLOAT:
             return float(value)
     elif kind is int:
@@ -75,7 +75,7 @@ def _known(name: str, choices: typing.Iterable[str], what: str) -> None:
 
 
 def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
-    """An object of the dataclass `kind` from a table; InputError names a key unknown, missing or wrong."""
+    """Return an object of the dataclass `kind` from a table; InputError names the key that is wrong."""
     hints = typing.get_type_hints(kind)
     keys = {f.name: f for f in fields(typing.cast(Any, kind)) if f.init}
     for key in table:
@@ -88,7 +88,7 @@ def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
 
 
 def from_kinds(kinds: Mapping[str, type[T]], table: Mapping[str, Any], where: str, selector: str = "kind") -> T:
-    """An object of the class that the key `selector` chooses, made from the other keys by `from_table`."""
+    """Return an object of the class that the key `selector` chooses, made by `from_table` from the other keys."""
     rest = dict(table)
     if selector not in rest:
         raise InputError(f"`{where}.{selector}` is missing: choose from: {', '.join(sorted(kinds))}")

@@ -1,4 +1,4 @@
-"""What is written to the terminal: plain text, whatever files hold; and no failure of it stops the work."""
+"""Writing to the terminal: only plain text, whatever files hold; a failure never stops the work."""
 
 import contextlib
 import os
@@ -6,25 +6,24 @@ import sys
 from typing import IO, Any
 
 READER_GONE = 141
-"""The exit code of a program whose output nobody reads any more: 128 and the signal's number."""
+"""The exit code if nobody reads the program's output any more: 128 and the signal's number."""
 
 
 def plain(text: str) -> str:
-    """A text on one line without what a terminal would obey: each such character as Python writes it, \\x1b.
+    """Return a text on one line; each control character is replaced by its Python form, such as \\x1b.
 
-    For what comes out of files and names of files, so that it can neither move the cursor nor begin a line that
-    looks like one of ours.
+    It is for texts and names from files: they can neither move the cursor nor begin a line that looks like ours.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(text: str) -> str:
-    """As `plain`, line by line: for what is made of several lines, each part of which is plain."""
+    """Return a text of several lines with `plain` applied to each line."""
     return "\n".join(plain(line) for line in text.split("\n"))
 
 
 def say(text: object, *, error: bool = False) -> None:
-    """Write a text and a new line on standard output, or on standard error, whose failure is no one's loss."""
+    """Write a text and a new line on standard output, or on standard error, where failures are ignored."""
     line = shown(str(text)) + "\n"
     if error:
         Murmur().write(line)
@@ -33,22 +32,22 @@ def say(text: object, *, error: bool = False) -> None:
             sys.stdout.write(line)
             sys.stdout.flush()
         except BrokenPipeError:
-            # who reads has seen enough, as `head` has
+            # the reader has closed, as `head` does
             silence(sys.stdout)
             raise SystemExit(READER_GONE) from None
 
 
 class Murmur:
-    """Standard error, for which nothing waits: closed, full or a pipe that nobody reads, the work goes on."""
+    """Standard error that nothing waits for: if it is closed, full or not read, the work continues."""
 
     encoding = "utf-8"
 
     def __init__(self) -> None:
-        """Standard error as it is now: a live bar puts itself in its place, and writes here."""
+        """Keep standard error as it is now: a live bar takes its place later and writes here."""
         self._stream = sys.stderr
 
     def write(self, text: str) -> int:
-        """Write, or do not."""
+        """Write the text if possible."""
         try:
             if self._stream is not None:
                 self._stream.write(text)
@@ -61,21 +60,21 @@ class Murmur:
         """Nothing waits."""
 
     def isatty(self) -> bool:
-        """Whether somebody watches."""
+        """Return whether it is a terminal."""
         try:
             return self._stream is not None and self._stream.isatty()
         except (OSError, ValueError):
             return False
 
     def fileno(self) -> int:
-        """As the system knows it; OSError where there is none."""
+        """Return the system's number of the stream; OSError if it does not exist."""
         if self._stream is None:
             raise OSError("standard error is closed")
         return self._stream.fileno()
 
 
 def silence(stream: IO[Any] | None) -> None:
-    """Send what a broken stream still holds, and all that follows, nowhere: Python would fail at its end."""
+    """Discard what a broken stream still holds and all that follows; otherwise Python would fail at its end."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         assert stream is not None
         nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -11,13 +11,13 @@ import numba
 from .cores import usable_cores
 from .settings import require
 
-_CONFIG: Any = numba.config  # its settings are made at run time
+_CONFIG: Any = numba.config  # its attributes exist only at run time
 _COUNT: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
 @contextmanager
 def threads(count: int | None) -> Iterator[int]:
-    """Run kernels on `count` threads (all that this process may use if None); yields the number."""
+    """Run kernels in the block on `count` threads (None: all that this process may use); yield the number."""
     most = max(usable_cores(), int(_CONFIG.NUMBA_NUM_THREADS))
     fits = count is None or 1 <= count <= most
     require(fits, f"`threads` must be from 1 to {most} on this machine; got {count}")
@@ -30,9 +30,9 @@ def threads(count: int | None) -> Iterator[int]:
 
 
 def in_parallel(kernel: Callable[[int, int], object], count: int, at_once: int) -> None:
-    """Call `kernel(first, last)` until 0..count - 1 are done, `at_once` of them in a call.
+    """Call `kernel(first, last)` until items 0 to count - 1 are done, `at_once` items in a call.
 
-    The kernel only writes to the rows of its items, so that results depend neither on threads nor on `at_once`.
+    The kernel writes only to the rows of its items, so results depend neither on threads nor on `at_once`.
     """
     spans = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
     workers = min(_COUNT.get() or usable_cores(), len(spans))

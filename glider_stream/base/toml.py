@@ -1,4 +1,4 @@
-"""TOML out of tables: the standard library only reads it."""
+"""Writes tables as TOML; the standard library can only read it."""
 
 import json
 from collections.abc import Mapping
@@ -7,26 +7,28 @@ from typing import Any
 from .errors import InputError
 
 DEEPEST = 20
-"""Levels of tables and lists in a scenario; it needs four."""
+"""A scenario may have this many levels of tables and lists; it needs four."""
 
 
 def check_depth(table: Mapping[str, Any], what: str) -> None:
-    """InputError where tables lie within tables so deep that nothing can be said of them."""
+    """Raise InputError if tables lie within tables too deeply."""
     level: list[Any] = [table]
     for _ in range(DEEPEST):
         level = [
             inner
-            for one in level
-            for inner in (one.values() if isinstance(one, Mapping) else one)
+            for item in level
+            for inner in (item.values() if isinstance(item, Mapping) else item)
             if isinstance(inner, (Mapping, list))
         ]
         if not level:
             return
-    raise InputError(f"{what} holds tables within tables, more than {DEEPEST} deep; a key has one dot or two")
+    raise InputError(
+        f"{what} holds tables within tables, more than {DEEPEST} deep; use keys with one or two dots"
+    )
 
 
 def to_toml(table: Mapping[str, Any], prefix: str = "") -> str:
-    """A nested table as TOML text: values first, then sub-tables, then lists of tables."""
+    """Return a nested table as TOML text: values first, then sub-tables, then lists of tables."""
     lines, below = [], []
     for key, value in table.items():
         if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Checks of packed files that may come from anyone, such as HDF5, before their data are read."""
+"""Checks of packed files such as HDF5, which may come from anyone, before their data are read."""
 
 import math
 import stat
@@ -10,25 +10,28 @@ import h5py
 from .settings import require
 
 MOST_RATIO = 1100
-"""Deflate packs at most 1032 to 1. A file that claims more data than this for its size is damaged."""
+"""Deflate packs at most 1032 to 1. A file that declares more data for its size is damaged."""
 FREE = 50_000_000
-"""A claim up to this size [bytes] is not compared with the size of the file."""
+"""A declared size up to this [bytes] is not compared with the size of the file."""
 MOST_OBJECTS = 10_000
-"""No current file and no roadmap holds as many groups and datasets."""
+"""Current files and roadmaps hold fewer groups and datasets than this."""
 
 
 def check_file(path: str | Path, what: str) -> None:
-    """InputError where `what` is neither a file nor a folder: reading a pipe or a device may never end."""
+    """Raise InputError if `what` is neither a file nor a folder: reading a pipe or a device may never end."""
     try:
         mode = Path(path).stat().st_mode
     except (OSError, ValueError):
-        return  # who reads it says what is wrong
+        return  # the reader reports the error
     ordinary = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
-    require(ordinary, f"{what} {path} is a pipe or a device, and no file; save it as a file first")
+    require(ordinary, f"{what} {path} is a pipe or a device, not a file; save it as a file first")
 
 
 def check_claim(file: str | Path, name: str, shape: Sequence[int], itemsize: int, held: int) -> None:
-    """InputError, before room is made, if data `name` claim more than a file of `held` bytes can hold."""
+    """Raise InputError if data `name` declare more than a file of `held` bytes can hold.
+
+    This is checked before memory is used.
+    """
     claimed = math.prod(shape) * itemsize
     require(
         claimed <= max(FREE, MOST_RATIO * held),
@@ -37,9 +40,9 @@ def check_claim(file: str | Path, name: str, shape: Sequence[int], itemsize: int
 
 
 def check_links(path: str | Path) -> None:
-    """InputError where a file leads out of itself: external links, external or virtual datasets.
+    """Raise InputError if a file refers to other files: external links, external or virtual datasets.
 
-    OSError or RuntimeError, as h5py has them, where it is damaged.
+    OSError or RuntimeError, from h5py, if it is damaged.
     """
     seen: set[object] = set()
     with h5py.File(path, "r") as file:
@@ -51,7 +54,8 @@ def check_links(path: str | Path) -> None:
                 within = not isinstance(link, h5py.ExternalLink)
                 require(
                     within,
-                    f"{path} links to another file at `{name}`, and the link is not followed: copy the data in",
+                    f"{path} links to another file at `{name}`, but links are not followed: copy the data into "
+                    "it",
                 )
                 if isinstance(link, h5py.SoftLink):
                     continue
@@ -66,13 +70,14 @@ def check_links(path: str | Path) -> None:
                     inside = not item.external and not item.is_virtual
                     require(
                         inside,
-                        f"the data of `{name}` in {path} lie in other files, which are not read: copy them in",
+                        f"the data of `{name}` in {path} lie in other files, which are not read: copy them into "
+                        "it",
                     )
                     _check_storage(path, str(item.name).lstrip("/"), item)
 
 
 def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
-    """InputError where a dataset is of lists, whose lengths may be anything, or larger than it can be."""
+    """Raise InputError if a dataset holds lists, whose lengths may be anything, or declares too much data."""
     inner = h5py.check_vlen_dtype(dataset.dtype)
     even = inner is None or inner in (str, bytes)
     require(even, f"`{name}` in {path} holds lists of uneven lengths, which are not read: write plain numbers")
@@ -81,7 +86,7 @@ def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:
 
 
 def groups_of(path: str | Path) -> tuple[list[str], set[str]]:
-    """The names of all groups of a file, and of those with data of two dimensions or more; "" is the root."""
+    """Return the names of all groups, and of those with data of two or more dimensions; "" is the root."""
     every: list[str] = []
     grids: set[str] = set()
 

@@ -1,1 +1,1 @@
-"""How good it is: benchmarks, the suite of problems, baselines, brute force."""
+"""Measures the quality: benchmarks, the suite of problems, baselines, brute force."""

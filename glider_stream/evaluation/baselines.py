@@ -1,4 +1,4 @@
-"""What a planner must be better than: straight to the goal, drift, and a search in depth-averaged currents."""
+"""Baselines that a planner must beat: straight to the goal, drift, a search in depth-averaged currents."""
 
 import math
 
@@ -14,17 +14,20 @@ from ..kernels.place import Place, Velocity
 from ..roadmap.problem import Problem
 
 CELLS, DEPTHS, REACH = 48, 8, 3
-"""The depth-averaged search: cells along the longer side, depths of the mean, cells to a neighbour at most."""
+"""Settings of the depth-averaged search.
+
+CELLS: cells along the longer side; DEPTHS: depths of the mean; REACH: the most cells to a neighbour.
+"""
 LONGEST = 40
-"""Horizons of a leg after which a baseline has not arrived."""
+"""A baseline that has not arrived after this many horizons of a leg does not arrive."""
 
 
 @entry_point()
 def follow(flow, point, stops, speed, sink, floor, ceiling, t, dt, latest, near, within):  # type: ignore[no-untyped-def]
-    """When a yo that always heads for its next stop is `within` [m] of the last one, at any depth; inf if never.
+    """Return the time when a yo that heads for its next stop is `within` [m] of the last; inf if never.
 
-    From `point` (3,) [m] at t [s]; `stops` (n, 2) [m], all but the last passed when `near` [m]; `speed` and
-    `sink` through water [m/s].
+    It starts at `point` (3,) [m] at t [s] and may be at any depth. `stops` (n, 2) [m]: all but the last are
+    passed when `near` [m]. `speed` and `sink` are through water [m/s].
     """
     x, y, z = point
     now, n, w = 0.0, 0, -sink
@@ -59,28 +62,28 @@ def _flown(problem: Problem, start: Array, stops: Array, speed: float, sink: flo
 
 
 def best_glide(problem: Problem) -> tuple[float, float]:
-    """The greatest horizontal speed of the glide polar, and the vertical speed there [m/s]."""
+    """Return the greatest horizontal speed of the glide polar and the vertical speed there [m/s]."""
     table = problem.evaluator.polar
     speed = float(table.best_horizontal[0])
     return speed, speed * math.tan(float(table.best_angle[0]))
 
 
 def straight(problem: Problem, start: Array, goal: Array) -> float:
-    """Travel time [s] of a yo at best glide that always heads for the goal; inf where it never arrives."""
+    """Return the travel time [s] of a yo at best glide that heads for the goal; inf if it never arrives."""
     return _flown(problem, start, goal[None, :2], *best_glide(problem))
 
 
 def drift(problem: Problem, start: Array, goal: Array) -> float:
-    """Time [s] in which only the current, at the start's depth, carries a float to the goal; inf if never."""
+    """Return the time [s] in which the current at the start's depth carries a float to the goal; inf if never."""
     return _flown(problem, start, goal[None, :2], 0.0, 0.0)
 
 
 def depth_averaged(problem: Problem, start: Array, goal: Array) -> float:
-    """Travel time [s] of a yo along the fastest path in depth-averaged currents, flown in the full ones.
+    """Return the travel time [s] of a yo along the fastest path in depth-averaged currents.
 
-    The plan is the best of a grid over the domain, between cells up to REACH apart, at the greatest horizontal
-    speed; Dijkstra's search finds what A* would. The yo heads for the plan's points one by one; inf where there
-    is no plan or it does not arrive.
+    The plan is the best path on a grid over the domain, between cells up to REACH apart, at the greatest
+    horizontal speed; Dijkstra's search finds the same path as A*. The yo flies in the full currents and heads for
+    the plan's points one by one. inf if there is no plan or the yo does not arrive.
     """
     lo, hi = problem.lo, problem.hi
     step = float((hi - lo)[:2].max()) / CELLS

@@ -1,4 +1,4 @@
-"""Benchmarks: what this machine does, each figure with its spread, so that two records can be compared."""
+"""Benchmarks: the speed of this machine; each figure has its spread, so that two records can be compared."""
 
 import json
 import math
@@ -37,7 +37,10 @@ from ..search.query import Planner
 from ..water.sampled import sample_flow
 
 STEPS, FLIGHTS, AT_ONCE = 60, 16_384, 256
-"""RK4 steps of a flight of the raw integrator, flights in batches of LANES, batches a thread takes at once."""
+"""The work of the raw integrator.
+
+RK4 steps of a flight; flights, in batches of LANES; batches that a thread takes at a time.
+"""
 RATED = {
     "streamline 16, 27 nearest": (),
     "surface 16, 27 nearest": ("steering.method=surface",),
@@ -53,7 +56,7 @@ PARTS = ("integrator", "methods", "threads", "sizes", "starts")
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured quantity, as often as it was measured; whether `more` of it is better."""
+    """One measured quantity with all its values; `more` tells whether more of it is better."""
 
     name: str
     unit: str
@@ -62,11 +65,11 @@ class Figure:
 
     @property
     def median(self) -> float:
-        """The middle value."""
+        """The median of the values."""
         return statistics.median(self.values)
 
     def as_dict(self) -> dict[str, Any]:
-        """As the record has it."""
+        """Return the figure as it stands in a record."""
         spread = {"median": self.median, "low": min(self.values), "high": max(self.values)}
         return (
             {"name": self.name, "unit": self.unit, "more_is_better": self.more}
@@ -75,19 +78,23 @@ class Figure:
         )
 
     def __str__(self) -> str:
-        spread = f"{_said(min(self.values))} to {_said(max(self.values))}" if len(self.values) > 1 else "one run"
-        return f"{self.name:<44}{_said(self.median):>12} {self.unit:<16}({spread})"
+        spread = (
+            f"{_number_text(min(self.values))} to {_number_text(max(self.values))}"
+            if len(self.values) > 1
+            else "one run"
+        )
+        return f"{self.name:<44}{_number_text(self.median):>12} {self.unit:<16}({spread})"
 
 
 @dataclass(frozen=True)
 class Record:
-    """A run's figures, when and on what they were measured."""
+    """The figures of a run, with the date and the machine."""
 
     figures: tuple[Figure, ...]
     made: dict[str, Any]
 
     def as_dict(self) -> dict[str, Any]:
-        """The record for JSON; the raw integrator's rate, where measured, also under a name of its own."""
+        """Return the record for JSON; the raw integrator's rate also has a key of its own."""
         raw = {figure.name: figure.median for figure in self.figures if figure.name == "evaluations_per_s"}
         return self.made | raw | {"figures": [figure.as_dict() for figure in self.figures]}
 
@@ -97,7 +104,7 @@ class Record:
         return "\n".join([head, *(f"  {figure}" for figure in self.figures)])
 
     def moved(self, before: dict[str, Any]) -> list[str]:
-        """What lies outside the spread of a record before, in words: both spreads, and which is better."""
+        """Return texts on figures outside the spread of an earlier record: the ratio, and which is better."""
         then = {figure["name"]: figure for figure in before["figures"]}
         moved = []
         for now in self.figures:
@@ -106,7 +113,7 @@ class Record:
                 continue
             better = "better" if (now.median > old["median"]) == now.more else "worse"
             ratio = now.median / old["median"]
-            moved.append(f"{now.name}: {ratio:.2f} times {_said(old['median'])} {now.unit}, {better}")
+            moved.append(f"{now.name}: {ratio:.2f} times {_number_text(old['median'])} {now.unit}, {better}")
         return moved
 
 
@@ -118,10 +125,10 @@ def bench(
     ceiling: str | Path | None = None,
     progress: Callable[[Figure], None] = lambda figure: None,
 ) -> Record:
-    """Measure the parts named in `only` (all if none), each figure `runs` times.
+    """Return a record of the parts in `only` (empty: all), each figure measured `runs` times.
 
-    `quick` measures small problems, to see that all of it runs. `ceiling`: a program that prints its own
-    `evaluations_per_s` as JSON; the raw integrator is measured in turns with it.
+    `quick` measures small problems, to check that everything runs. `ceiling`: a program that prints its own
+    `evaluations_per_s` as JSON; it takes turns with the raw integrator.
     """
     require(runs >= 1, f"`runs` must be at least 1; got {runs}")
     for name in only:
@@ -147,7 +154,7 @@ def bench(
 
 
 def made_by(thread_count: int, quick: bool) -> dict[str, Any]:
-    """When and on what a record is made."""
+    """Return the date and the machine of a record."""
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "processor": platform.processor() or platform.machine(),
@@ -174,7 +181,7 @@ def _fly(flow, start, end, first, last):  # type: ignore[no-untyped-def]
 
 
 def integrator(runs: int, ceiling: str | Path | None) -> Iterator[Figure]:
-    """Currents interpolated per second inside RK4, through a grid as large as the ceiling's own."""
+    """Yield the currents interpolated per second inside RK4, from a grid as large as the ceiling's."""
     flow = read_scenario("seed-box").problem().evaluator.flow
     box = (-600.0, 600.0)
     grid = sample_flow(flow, (12.0, 12.0, 10.0), box, box, (-300.0, 0.0))
@@ -203,14 +210,14 @@ def _ceiling(program: str | Path) -> float:
 
 
 def methods(runs: int, quick: bool) -> Iterator[Figure]:
-    """Pairs per second by method and law, on the seed box; compilation left out."""
+    """Yield pairs per second for each method and neighbour law, on the seed box, without compilation."""
     shape = "[5,5,3]" if quick else "[16,16,4]"
     for name, overrides in RATED.items():
         yield Figure(name, "pairs/s", tuple(_rate(overrides, shape) for _ in range(runs)))
 
 
 def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
-    """All threads over one, in turns."""
+    """Yield the speed on all threads over the speed on one thread, measured in turns."""
     shape = "[5,5,3]" if quick else "[12,12,4]"
     for name in ("streamline 16, all", "flow map, all"):
         ratios = []
@@ -221,7 +228,7 @@ def thread_scaling(runs: int, quick: bool) -> Iterator[Figure]:
 
 
 def _rate(overrides: Sequence[str], shape: str, count: int | None = None) -> float:
-    """Pairs per second of a build of the seed box with so many nodes, on `count` threads, all if None."""
+    """Return pairs per second of a build of the seed box on `count` threads (None: all)."""
     problem = read_scenario("seed-box", [*overrides, f"sampling.shape={shape}"]).problem()
     position = node_positions(problem)
     with threads(count):
@@ -231,7 +238,7 @@ def _rate(overrides: Sequence[str], shape: str, count: int | None = None) -> flo
 
 
 def growing(nodes: int) -> str:
-    """A scenario, as text, whose box grows with its nodes on four depths; vortices and nodes as dense as ever."""
+    """Return a scenario as text whose box grows with its nodes on four depths, at constant density."""
     side = math.ceil(math.sqrt(nodes / 4))
     half = 28.125 * side
     rng = np.random.default_rng(5)
@@ -262,9 +269,9 @@ def growing(nodes: int) -> str:
 
 
 def sizes(runs: int, quick: bool) -> Iterator[Figure]:
-    """Builds and queries of ever larger roadmaps, in processes of their own: time, memory, further queries."""
+    """Yield time and memory of builds and queries of larger and larger roadmaps, in their own processes."""
     with tempfile.TemporaryDirectory() as folder:
-        for nodes in (100, 400) if quick else SIZES:
+        for nodes in (400,) if quick else SIZES:
             name, scenario, file = f"{nodes:,} nodes", Path(folder) / "growing.toml", Path(folder) / "growing.h5"
             scenario.write_text(growing(nodes))
             walls, megabytes = [], []
@@ -277,7 +284,7 @@ def sizes(runs: int, quick: bool) -> Iterator[Figure]:
             yield Figure(f"{name}: build, wall time", "s", tuple(walls), False)
             yield Figure(f"{name}: most memory", "MB", tuple(megabytes), False)
             yield Figure(f"{name}: edges", "", (float(road.target.size),))
-            first = tuple(_process("query", file)[0] for _ in range(5))
+            first = tuple(_process("query", file)[0] for _ in range(1 if quick else 5))
             yield Figure(f"{name}: first query, whole process", "s", first, False)
             began = time.perf_counter()
             problem = scenario_of(road).problem()
@@ -291,7 +298,7 @@ def sizes(runs: int, quick: bool) -> Iterator[Figure]:
 
 
 def starts(runs: int, quick: bool) -> Iterator[Figure]:
-    """Whole processes: what does nothing, what does something, with compiled kernels at hand and without."""
+    """Yield the time of whole processes: idle ones and working ones, with and without compiled kernels."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "small.h5"
         small = ["build", "seed-box", "-o", file, "--set", "sampling.shape=[4,4,3]"]
@@ -299,7 +306,8 @@ def starts(runs: int, quick: bool) -> Iterator[Figure]:
         commands: dict[str, list[Any]] = {"--help": ["--help"], "build, streamline 16": small}
         commands |= {"info": ["info", file], "query": ["query", file], "build, flow map": builds["flow map"]}
         for name, command in commands.items():
-            _process(*command)
+            if not quick:
+                _process(*command)
             yield Figure(f"start: {name}", "s", tuple(_process(*command)[0] for _ in range(runs)), False)
         for name, command in () if quick else builds.items():
             cold = Path(folder) / name
@@ -315,11 +323,11 @@ seconds = time.perf_counter() - began
 print(seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, run.returncode)
 sys.stderr.buffer.write(run.stderr[-300:])
 """
-"""A small process between: a large one would be taken for its child's own memory."""
+"""A small process in between: the memory of a large process would count as its child's."""
 
 
 def _process(*arguments: Any, environment: dict[str, str] | None = None) -> tuple[float, float]:
-    """Wall time [s] and most memory [MB] of a command in a process of its own; a query may find no path."""
+    """Return wall time [s] and most memory [MB] of a command in its own process; a query may find no path."""
     program = [sys.executable, "-c", "from glider_stream.cli import main; main()", *map(str, arguments)]
     measured = subprocess.run(
         [sys.executable, "-c", MEASURED, *program],
@@ -329,7 +337,7 @@ def _process(*arguments: Any, environment: dict[str, str] | None = None) -> tupl
         check=True,
     )
     seconds, memory, code = measured.stdout.split()
-    require(code in ("0", "1"), f"`{arguments[0]}` failed: {measured.stderr}; mend that")
+    require(code in ("0", "1"), f"`{arguments[0]}` failed: {measured.stderr}; mend the cause")
     return float(seconds), float(memory) / (1e6 if sys.platform == "darwin" else 1e3)
 
 
@@ -339,18 +347,18 @@ def _seconds(task: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
-def _said(value: float) -> str:
+def _number_text(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
 def read_record(file: str | Path) -> dict[str, Any]:
-    """A record that `bench --json` wrote; InputError where it is not one."""
+    """Return a record that `bench --json` wrote; InputError if it is not one."""
     try:
         check_file(file, "the record")
         record = json.loads(Path(file).read_text(encoding="utf-8"))
         for figure in record["figures"]:
             sound = isinstance(figure["name"], str) and figure["low"] <= figure["median"] <= figure["high"]
-            require(sound and figure["median"] != 0, "its figures make no sense")
+            require(sound and figure["median"] != 0, "its figures are not usable")
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         text = (error.strerror or "it is not a file").lower() if isinstance(error, OSError) else str(error)
         raise InputError(f"the record {file} cannot be read: {text}; write it with `bench --json`") from None
@@ -358,6 +366,6 @@ def read_record(file: str | Path) -> dict[str, Any]:
 
 
 def write_record(record: dict[str, Any], file: str | Path) -> None:
-    """Write a record, as a table, as JSON."""
+    """Write a record to a file as JSON."""
     with replacing(Path(file)) as temporary:
         temporary.write_text(json.dumps(record, indent=1) + "\n")

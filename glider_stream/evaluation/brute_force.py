@@ -1,4 +1,4 @@
-"""Brute force: every connection of a pair, by a scan of all controls and Newton from each local minimum."""
+"""Brute force: finds every connection of a pair by a scan of all controls and Newton from each local minimum."""
 
 import math
 
@@ -14,7 +14,10 @@ from ..kernels.place import Place
 
 @njit
 def land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
-    """Where and when a control, left at t [s], lands at a depth: x, y [m], duration [s]; if the flow is known."""
+    """Return where and when a control that starts at t [s] reaches a depth.
+
+    x, y [m], duration [s], and whether the flow is known on the way.
+    """
     c = control_towards(polar, direction, angle, heading)
     duration = (z_q - z) / c.w
     known = True
@@ -29,7 +32,7 @@ def land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt):
 
 @njit
 def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt, horizon):
-    """Travel time of the solution that damped Newton steps lead to [s]; inf where they do not close in."""
+    """Return the travel time [s] of the solution that damped Newton steps find; inf if they do not converge."""
     low, high = polar.shallowest[direction], polar.steepest[direction]
     for _ in range(30):
         x_0, y_0, duration, known = land(flow, polar, direction, x, y, z, z_q, t, angle, heading, dt)
@@ -61,9 +64,9 @@ def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt
 
 @njit
 def scan(flow, polar, direction, position, source, target, t, angles, headings, dt):
-    """Distance [m] from each target of all controls' landings at its depth: (targets, angles, headings).
+    """Return the distance [m] between each target and all landings at its depth: (targets, angles, headings).
 
-    One flight a control: what `land` does, for all targets on its way, as long as it takes to get there.
+    There is one flight for each control: it does the work of `land` for all targets on its way.
     """
     low, high = polar.shallowest[direction], polar.steepest[direction]
     order = np.argsort(np.abs(position[target, 2] - position[source, 2]))
@@ -88,7 +91,7 @@ def scan(flow, polar, direction, position, source, target, t, angles, headings, 
 
 @njit
 def is_lowest(off, i, j):
-    """Whether a control lands no further off than those beside it."""
+    """Return whether a control lands no further off than its neighbours."""
     angles, headings = off.shape
     for di in range(-1, 2):
         for dj in range(-1, 2):
@@ -99,7 +102,7 @@ def is_lowest(off, i, j):
 
 @entry_point(nogil=True)
 def fastest_legs(flow, polar, position, source, target, t, angles, headings, dt, horizon):
-    """Least travel time of every pair (source, target), left at t [s]; inf where none is found."""
+    """Return the least travel time [s] of every pair (source, target) from t [s] on; inf if none is found."""
     best = np.full((source.size, target.size), np.inf)
     for s in range(source.size):
         x, y, z = position[source[s]]

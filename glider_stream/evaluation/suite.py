@@ -1,4 +1,4 @@
-"""The suite: problems with references, and what methods and baselines make of them and of random queries."""
+"""The suite: problems with references, and the results of methods and baselines on them and on random queries."""
 
 import json
 import math
@@ -34,22 +34,22 @@ COMPARED: dict[str, Method] = {
     "surface": SurfaceMethod(16),
 }
 LAW = "neighbours.kind=reachable"
-"""Every method is asked of the same pairs: those that the flow map says can be flown."""
+"""Every method gets the same pairs: those that the flow map can fly."""
 BEST = "best known"
 DENSE, DENSE_LIMIT = 4096, 128
 """Nodes and limit of the roadmap whose routes are the best known of random queries."""
 SCAN = (48, 96)
-"""Controls that brute force begins with."""
+"""Brute force begins with this scan of controls."""
 QUARTILES = (25, 50, 75, 95)
 ROW = "{:<17}{:<16}{:>10}{:>13}{:>9}{:>10}{:>11}"
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A problem's least travel time [s], None where no path exists; its kind, and how it is known.
+    """A problem's least travel time [s] (None if no path exists), its kind, and how it is known.
 
-    In closed form `bound` is the same. By level set `seconds` is the fastest path known, its controls changing
-    at every instant (of an unsteady flow the finest grid's arrival), and no path is faster than `bound`.
+    In closed form `bound` is the same. By level set, `seconds` is the fastest known path, whose controls change
+    at every instant (in an unsteady flow the finest grid's arrival), and no path is faster than `bound`.
     """
 
     seconds: float | None
@@ -72,7 +72,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a method makes of a problem: its route [s], build [s], edges, pairs; None where it has none."""
+    """The result of a method on a problem: route [s], build [s], edges, pairs; None where there is no value."""
 
     problem: str
     method: str
@@ -89,7 +89,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Report:
-    """A run of the suite: outcomes, attempts at random queries, completeness (share, of how many legs)."""
+    """The results of the suite: outcomes, attempts at random queries, completeness (share, number of legs)."""
 
     references: dict[str, Reference]
     outcomes: tuple[Outcome, ...]
@@ -98,13 +98,15 @@ class Report:
     made: dict[str, Any]
 
     def over_reference(self, outcome: Outcome) -> float | None:
-        """Travel time over the problem's reference, where both are known."""
+        """Return travel time over the problem's reference, if both are known."""
         seconds = self.references[outcome.problem].seconds
         return outcome.travel_time / seconds if seconds and outcome.solved else None
 
     def quality(self) -> list[dict[str, Any]]:
-        """Per problem and method, of random queries: success among those that any method solves, and the
-        quartiles and 95 % of the travel time over the best known."""
+        """Return rows for each problem and method on random queries: success, and time over the best known.
+
+        Success is the share of the queries that any method solves. The time is given by quartiles and 95 %.
+        """
         best = {(a.problem, a.pair): a.travel_time for a in self.attempts if a.method == BEST}
         for attempt in self.attempts:
             best[attempt.problem, attempt.pair] = min(best[attempt.problem, attempt.pair], attempt.travel_time)
@@ -121,7 +123,7 @@ class Report:
         return rows
 
     def as_dict(self) -> dict[str, Any]:
-        """The report for JSON; infinite times are null."""
+        """Return the report for JSON; infinite times are null."""
         outcomes = []
         for outcome in self.outcomes:
             row = {**asdict(outcome), "solved": outcome.solved, "over_reference": self.over_reference(outcome)}
@@ -161,7 +163,7 @@ class Report:
 
 
 def references() -> dict[str, Reference]:
-    """The suite's problems, shipped scenarios, by name, and what is known of them."""
+    """Return the references of the suite's problems (shipped scenarios) by name."""
     text = (files("glider_stream") / "data" / "references.json").read_text(encoding="utf-8")
     return {name: Reference(**fields) for name, fields in json.loads(text).items()}
 
@@ -173,7 +175,10 @@ def run_suite(
     pairs: int = 20,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Report:
-    """Run the problems named in `only`, all if none; `pairs` random queries each; `quick`: few of all."""
+    """Return the report on the problems in `only` (empty: all), with `pairs` random queries each.
+
+    `quick`: a small run.
+    """
     known = references()
     for name in only:
         require(name in known, f"the problem {name!r} is not known; choose from: {', '.join(known)}")
@@ -216,7 +221,7 @@ def _baselines(name: str, problem: Problem) -> list[Outcome]:
 
 
 def _completeness(problem: Problem, position: Array, count: int) -> tuple[float, int]:
-    """Of the legs that brute force finds from some nodes to some others, the share that is found."""
+    """Return the found share of the legs that brute force finds from some nodes to others, and their number."""
     rng, evaluator = np.random.default_rng(0), problem.evaluator
     source = rng.choice(len(position), min(count, len(position)), replace=False)
     target = np.sort(rng.choice(len(position), min(100, len(position)), replace=False))
@@ -232,7 +237,7 @@ def _completeness(problem: Problem, position: Array, count: int) -> tuple[float,
 def _attempts(
     name: str, problem: Problem, planners: dict[str, RoutePlanner], count: int, dense: int
 ) -> list[Attempt]:
-    """Queries between random points, by every planner and baseline, and by a denser roadmap."""
+    """Return the attempts of every planner and baseline, and of a denser roadmap, at random queries."""
     rng = np.random.default_rng(1)
     points = rng.uniform(problem.lo, problem.hi, (8 * count, 3))
     points = points[problem.evaluator.allowed(points, problem.departure)][: 2 * count]
@@ -258,7 +263,7 @@ def _attempts(
 
 
 def ompl_log(report: Report, problem: str) -> str:
-    """One problem's random queries as an OMPL benchmark log (ompl.kavrakilab.org/benchmark.html): a run each."""
+    """Return one problem's random queries as an OMPL benchmark log (ompl.kavrakilab.org/benchmark.html)."""
     chosen = [attempt for attempt in report.attempts if attempt.problem == problem]
     methods = list(dict.fromkeys(attempt.method for attempt in chosen))
     runs = len({attempt.pair for attempt in chosen})

@@ -1,1 +1,1 @@
-"""Long builds: files that survive being killed, shards, clusters, reuse after a change."""
+"""Long builds: files that survive a kill, parts (shards), clusters, and reuse after a change."""

@@ -1,4 +1,4 @@
-"""Jobs: builds that survive their process, in parts, on what an older roadmap holds, and on a cluster."""
+"""Jobs: builds that survive a kill; in parts, on a cluster, or with the edges of an older roadmap."""
 
 import heapq
 import re
@@ -26,24 +26,24 @@ from .journal import Journal
 
 Finder = Callable[[Problem, Array, Index, int], Iterator[Edges]]
 CHECKPOINT = 30.0
-"""Seconds between two requests that the disk keep what was found."""
+"""After this many seconds the disk is asked again to keep what was found."""
 
 
 def shard_of(text: str) -> Shard:
-    """The shard 3 of 16 from "3/16"."""
+    """Return shard 3 of 16 for the text "3/16"."""
     match = re.fullmatch(r"\s*(\d{1,7})\s*/\s*(\d{1,7})\s*", text)
     number, count = (int(match.group(n)) for n in (1, 2)) if match else (0, 0)
-    require(1 <= number <= count, f"a shard is a number of a count, such as 3/16; got {text!r}")
+    require(1 <= number <= count, f"a shard is NUMBER/COUNT, such as 3/16; got {text!r}")
     return Shard(number, count)
 
 
 @dataclass(frozen=True)
 class Job:
-    """How a build is run; nothing of it changes a bit of what is found.
+    """Settings of a build; they do not change a bit of the result.
 
-    `restart`: forget what an earlier run has kept. `checkpoint` [s]: see `Journal`. `shard`: a part alone.
-    `base`: an older roadmap, and the nodes (n,) whose edges it still has right. `finder`: who evaluates;
-    `warm` whether kernels are compiled here first.
+    `restart`: forget what an earlier run has kept. `checkpoint` [s]: see `Journal`. `shard`: build only this
+    part. `base`: an older roadmap, and the nodes (n,) whose edges are still right. `finder`: evaluates the nodes.
+    `warm`: whether the kernels are compiled here first.
     """
 
     restart: bool = False
@@ -65,14 +65,14 @@ def build_file(
     batch_pairs: int = BATCH_PAIRS,
     job: Job = Job(),
 ) -> None:
-    """Build a problem's roadmap into a file: memory holds the nodes and one batch of edges.
+    """Build the roadmap of a problem into a file; memory holds the nodes and one batch of edges.
 
-    What is found is kept in a journal beside the file, from which the same call goes on after a kill. The
-    file appears whole, or not at all.
+    Edges are kept in a journal beside the file; the same call continues from it after a kill. The file appears
+    whole or not at all.
     """
     path = Path(path)
     check_output(path)
-    target = path.resolve()  # a link stays one
+    target = path.resolve()  # a link stays a link
     with locked(target):
         remove_abandoned(target)
         position = node_positions(problem)
@@ -80,7 +80,7 @@ def build_file(
         shard = job.shard or Shard(1, 1)
         nodes = np.arange(*shard.nodes(len(position)))
         old = _taken_over(job, nodes)
-        # what a base gave is no part of the records, so none of them fits another base, or none
+        # records do not hold the edges of the base, so they fit only a build with the same base
         identity = {**made.identity(), "shard": str(shard), "nodes": len(position), "base": old.digest()}
         journal_path = target.with_name(f"{target.name}.journal")
         kept = ""
@@ -96,13 +96,13 @@ def build_file(
                         f"{int(journal.done.sum()):,} of {len(position):,} nodes are kept in {journal_path.name}"
                     )
         except KeyboardInterrupt:
-            raise Stopped(f"stopped; {kept}: give the same command again to go on") from None
+            raise Stopped(f"stopped; {kept}: give the same command again to continue") from None
         except Unwritable as error:
-            raise InputError(f"{error}; {kept}: give the same command again to go on") from None
+            raise InputError(f"{error}; {kept}: give the same command again to continue") from None
         except OSError as error:
             reason, more = (error.strerror or "it cannot be written").lower(), ""
             if kept:
-                more = f"; {kept}: give the same command again to go on"
+                more = f"; {kept}: give the same command again to continue"
             room = "make room on its disk, or name another output"
             raise InputError(f"the output {path} cannot be written whole: {reason}; {room}{more}") from None
 
@@ -131,7 +131,7 @@ def _run(
     made = sample.checked(made, problem, position, lambda some: job.finder(problem, position, some, batch_pairs))
     known = journal.done.copy()
     twice = known[old.source].any()
-    require(not twice, f"{journal.path} holds nodes that --from has right; begin anew with --restart")
+    require(not twice, f"{journal.path} holds nodes that --from already covers; start again with --restart")
     known[old.source] = True
     waiting = nodes[~known[nodes]]
     if waiting.size:
@@ -148,12 +148,12 @@ def _run(
 
 
 def _first(edges: Edges) -> int:
-    """The first node that edges leave, -1 where there is none."""
+    """Return the first node that the edges leave, or -1 if there are no edges."""
     return int(edges.source[0]) if edges.source.size else -1
 
 
 def _taken_over(job: Job, nodes: Index) -> Edges:
-    """Of some nodes, the edges that an older roadmap has right."""
+    """Return the edges of these nodes that an older roadmap has right."""
     if job.base is None:
         return in_order([])
     road, right = job.base
@@ -166,30 +166,35 @@ def _taken_over(job: Job, nodes: Index) -> Edges:
 
 
 def merge(parts: Sequence[str | Path], output: str | Path) -> None:
-    """Make one roadmap of its shards; InputError, naming them, where they are not all of one."""
+    """Merge the shards of a roadmap into one file.
+
+    InputError if a shard is missing, is given twice, or belongs to another roadmap.
+    """
     check_output(output)
-    require(len(parts) > 0, "there is nothing to merge; name the parts that `build --shard` wrote")
+    require(len(parts) > 0, "there is nothing to merge; give the parts that `build --shard` wrote")
     heads = [(Path(path), read_part(path, edges=False)) for path in parts]
     first_path, first = heads[0]
     seen: dict[int, Path] = {}
     for path, part in heads:
         require(
             part.shard.count == first.shard.count,
-            f"{path} is part {part.shard} and {first_path} part {first.shard}; give parts of one division",
+            f"{path} is part {part.shard} but {first_path} is part {first.shard}; give parts with the same count",
         )
         mine, others = part.provenance.identity(), first.provenance.identity()
         unlike = [key for key in mine if mine[key] != others[key]]
         require(
             not unlike,
-            f"{path} is of another roadmap than {first_path}: {', '.join(unlike)} differ; build both alike",
+            f"{path} belongs to another roadmap than {first_path}: {', '.join(unlike)} differ; build both with "
+            "the same scenario and software",
         )
         number = part.shard.number
         require(number not in seen, f"{path} and {seen.get(number)} are both part {part.shard}; leave one out")
         seen[number] = path
     lacks = [str(n) for n in range(1, first.shard.count + 1) if n not in seen]
-    said = f"part {lacks[0]}" if len(lacks) == 1 else f"parts {', '.join(lacks[:20])}"
+    missing = f"part {lacks[0]}" if len(lacks) == 1 else f"parts {', '.join(lacks[:20])}"
     require(
-        not lacks, f"{said} of {first.shard.count} {'is' if len(lacks) == 1 else 'are'} missing; build and add it"
+        not lacks,
+        f"{missing} of {first.shard.count} {'is' if len(lacks) == 1 else 'are'} missing; build and add it",
     )
     target = Path(output)
     require(

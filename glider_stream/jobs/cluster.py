@@ -1,4 +1,4 @@
-"""Builds on a cluster: the same chunks of nodes, evaluated by the workers of a Dask scheduler."""
+"""Builds on a cluster: the workers of a Dask scheduler evaluate the same chunks of nodes."""
 
 import contextlib
 import importlib
@@ -26,20 +26,20 @@ from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Edges
 
 AHEAD = 4
-"""Chunks that wait at the scheduler for each thread of a worker."""
+"""This many chunks wait at the scheduler for each thread of a worker."""
 TRIES = 10
-"""Workers that a chunk may lose before it is held for their end."""
+"""A chunk that has lost more workers than this has failed: the chunk itself may be the cause."""
 COUNT_AGAIN = 1.0
-"""Seconds after which the workers are counted again."""
+"""The workers are counted again after this many seconds."""
 WAIT = 60.0
-"""Seconds to wait for a scheduler and for its first worker."""
+"""Wait this many seconds for a scheduler and for its first worker."""
 _ONE_AT_A_TIME = threading.Lock()
-"""Kernels use all the threads of a worker's process: a worker with several of Dask's takes turns."""
+"""Kernels use all threads of a worker's process, so several Dask threads of a worker take turns."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """What a worker needs to evaluate any nodes: the problem, its nodes (n, 3) [m], who sent it."""
+    """The data that a worker needs to evaluate nodes: the problem, its nodes (n, 3) [m], and the sender."""
 
     problem: Problem
     position: Array
@@ -48,22 +48,24 @@ class Work:
 
 
 def software() -> dict[str, str]:
-    """What must be the same everywhere for the same bits."""
+    """Return the versions that must be equal everywhere to get the same bits."""
     return {"kernels": KERNEL_DIGEST} | {
         name: version(name) for name in ("glider-stream", "numpy", "numba", "scipy")
     }
 
 
 def check_software(asked: dict[str, str]) -> None:
-    """InputError, in a worker, unless it has what was asked for."""
+    """Raise InputError, in a worker, unless its versions are as asked."""
     unlike = [
-        f"{name} {own} and not {asked.get(name)}" for name, own in software().items() if own != asked.get(name)
+        f"{name} {version} and not {asked.get(name)}"
+        for name, version in software().items()
+        if version != asked.get(name)
     ]
-    require(not unlike, f"a worker has {', '.join(unlike)}; install the same there")
+    require(not unlike, f"a worker has {', '.join(unlike)}; install the same versions there")
 
 
 def evaluate(work: Work, source: NDArray[np.int64]) -> Edges:
-    """The edges from some nodes; what a worker runs."""
+    """Return the edges from some nodes; this runs in a worker."""
     check_software(work.software)
     with _ONE_AT_A_TIME, threads(work.threads):
         warm_up(work.problem)
@@ -80,10 +82,10 @@ def _distributed() -> Any:
 
 @contextlib.contextmanager
 def scheduler(address: str) -> Iterator["Cluster"]:
-    """A Dask scheduler at an address, or "local:N": N worker processes here, for as long as the block runs."""
+    """Yield the cluster of a Dask scheduler at an address; "local:N" starts N worker processes for the block."""
     distributed = _distributed()
-    own = re.fullmatch(r"local:(\d{1,4})", address)
-    if own is None:
+    local = re.fullmatch(r"local:(\d{1,4})", address)
+    if local is None:
         require(
             ":" in address, f"a scheduler is tcp://HOST:PORT, or local:N for N processes here; got {address!r}"
         )
@@ -93,15 +95,17 @@ def scheduler(address: str) -> Iterator["Cluster"]:
         except (OSError, TimeoutError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            said = " ".join(str(error).split())[:200]
-            raise InputError(f"no Dask scheduler answers at {address} ({said}); start one, or mend it") from None
+            message = " ".join(str(error).split())[:200]
+            raise InputError(
+                f"no Dask scheduler answers at {address} ({message}); start one, or correct the address"
+            ) from None
         return
-    count = int(own.group(1))
-    require(count >= 1, f"a local cluster has 1 worker or more; got {address!r}")
+    count = int(local.group(1))
+    require(count >= 1, f"a local cluster needs at least 1 worker; got {address!r}")
     each = max(1, usable_cores() // count)
     with (
         distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -110,27 +114,30 @@ def scheduler(address: str) -> Iterator["Cluster"]:
 
 @dataclass(frozen=True)
 class Cluster:
-    """A client of a scheduler; `threads` of each worker's kernels, all of its machine's if None."""
+    """A client of a scheduler; the kernels of each worker use `threads` threads (None: all of its machine)."""
 
     client: Any
     threads: int | None
 
     def find_edges(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
-        """As `roadmap.find_edges`, but in the order in which chunks are done; a lost worker's are done again."""
+        """Yield edges as `roadmap.find_edges` does, in the order in which chunks are done.
+
+        Chunks of a lost worker are done again.
+        """
         try:
             yield from self._evaluated(problem, position, source, batch_pairs)
         except InputError:
             raise
         except Exception as error:
-            # what the death of a worker or of the scheduler, or a broken network, raises is not written anywhere
+            # Dask does not document what it raises when a worker, the scheduler or the network fails
             reason = " ".join(str(error).split())[:300].rstrip(".") or type(error).__name__
             raise InputError(
-                f"the cluster failed: {reason}; give the same command to go on, here or with another scheduler"
+                f"the cluster failed: {reason}; give the same command to continue, here or with another scheduler"
             ) from None
 
     def _evaluated(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
         self.client.wait_for_workers(1, timeout=WAIT)
-        # degrees are made here, where the scenario is; a frame need not travel
+        # degrees are computed here, so that the frame need not be sent
         work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
         sent = self.client.scatter(work, broadcast=True, hash=False)
         size = max(1, batch_pairs // problem.legs(position).pairs_per_node)

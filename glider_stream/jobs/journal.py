@@ -1,4 +1,4 @@
-"""The journal of a build: what it has found, safe from the end of its process, until the roadmap is whole."""
+"""The journal of a build: keeps what was found, safe from the end of the process, until the roadmap is whole."""
 
 import hashlib
 import json
@@ -20,12 +20,15 @@ from ..roadmap.roadmap import EMPTY, Edges
 
 MAGIC = b"glider-stream/journal 1\n"
 RECORD = struct.Struct("<4sQQd")
-"""Of each record: a mark, nodes, edges, seconds. Then the arrays of `Edges`, then a digest of it all."""
+"""The head of a record: mark, number of nodes, number of edges, seconds.
+
+After it come the arrays of `Edges` and a digest of everything.
+"""
 MARK = b"edge"
 DIGEST = 16
 LONGEST_HEADER = 100_000
 BINARY = getattr(os, "O_BINARY", 0)
-"""Windows would otherwise write a carriage return before each byte 10."""
+"""Without this flag Windows would write a carriage return before each byte 10."""
 
 
 def _sizes(nodes: int, edges: int) -> list[tuple[tuple[int, ...], np.dtype[Any]]]:
@@ -36,16 +39,16 @@ def _sizes(nodes: int, edges: int) -> list[tuple[tuple[int, ...], np.dtype[Any]]
 class Journal:
     """Records of `Edges`, each written whole or not at all; `done` tells which nodes they hold.
 
-    What a kill leaves of an unfinished record is cut off. `every` [s]: how often the disk is asked to keep
-    what was written, against the loss of power; the loss of the process alone costs nothing written.
+    An unfinished record that a kill leaves is cut off. `every` [s]: how often the disk is asked to keep what was
+    written, against a loss of power. If only the process is lost, nothing written is lost.
     """
 
     def __init__(
         self, path: Path, identity: Mapping[str, Any], nodes: Index, restart: bool, every: float
     ) -> None:
-        """Go on with the journal at `path`, or begin it; InputError where it is of another build.
+        """Continue the journal at `path`, or begin it; InputError if it belongs to another build.
 
-        `nodes`, rising: those that records may hold, each once.
+        `nodes`, rising: the nodes that records may hold, each once.
         """
         self.path, self.every = path, every
         self.done = np.zeros(int(nodes[-1]) + 1 if nodes.size else 0, dtype=bool)
@@ -89,31 +92,31 @@ class Journal:
             self._file.close()
 
     def _resumes(self, identity: Mapping[str, Any], restart: bool) -> bool:
-        """Whether to go on with a journal of the same build; its records begin at `_end`."""
-        in_the_way = f"{self.path} is in the way of this build's journal, and is none; move it away"
+        """Return whether to continue a journal of the same build; its records begin at `_end`."""
+        in_the_way = f"{self.path} has the name of this build's journal but is not a journal; move it away"
         require(stat.S_ISREG(os.fstat(self._file.fileno()).st_mode), in_the_way)
         self._file.seek(0)
         head = self._file.read(LONGEST_HEADER)
         line = head[len(MAGIC) :].split(b"\n", 1)
-        # a build that was killed before its first word leaves a part of it
+        # a build that was killed at its first write leaves a part of the header
         require(head.startswith(MAGIC) or MAGIC.startswith(head), in_the_way)
         if restart or not head.startswith(MAGIC) or len(line) < 2:
             return False
         try:
-            said = json.loads(line[0])
+            header = json.loads(line[0])
         except (ValueError, RecursionError):
-            said = {}
-        if not isinstance(said, dict) or said != dict(identity):
-            keys = sorted(key for key in {*identity, *said} if dict(said).get(key) != identity.get(key))
+            header = {}
+        if not isinstance(header, dict) or header != dict(identity):
+            keys = sorted(key for key in {*identity, *header} if dict(header).get(key) != identity.get(key))
             raise InputError(
                 f"{self.path} keeps the progress of another build, whose {', '.join(keys)} differ; "
-                "finish that one with its own command, or begin anew with --restart"
+                "finish that build with its own command, or start again with --restart"
             )
         self._end = len(MAGIC) + len(line[0]) + 1
         return True
 
     def _scan(self) -> Iterator[Edges]:
-        """The whole records from `_end` on; moves `_end` past each."""
+        """Yield the whole records from `_end` on, and move `_end` past each."""
         size = os.fstat(self._file.fileno()).st_size
         while self._end < size:
             record = self._read(self._end, size)
@@ -127,7 +130,7 @@ class Journal:
             yield edges
 
     def _read(self, place: int, size: int) -> tuple[Edges, int] | None:
-        """The record at a place, and its length; None where it is cut short or damaged."""
+        """Return the record at a position and its length; None if it is cut short or damaged."""
         self._file.seek(place)
         head = self._file.read(RECORD.size)
         if len(head) < RECORD.size:
@@ -151,7 +154,7 @@ class Journal:
         return Edges(source, degree, target, values, counts, seconds), len(head) + len(body)
 
     def _is_new(self, edges: Edges) -> bool:
-        """Whether a record holds nodes of this build, rising, that no record before it holds."""
+        """Return whether a record holds rising nodes of this build that no earlier record holds."""
         source = edges.source
         rises = source.size > 0 and bool((np.diff(source) > 0).all())
         if not rises or self._nodes.size == 0 or source[0] < self._nodes[0] or source[-1] > self._nodes[-1]:
@@ -162,7 +165,7 @@ class Journal:
         self.done[edges.source] = True
 
     def _write(self, whole: bytes) -> None:
-        """Append, or leave the file as it was."""
+        """Append the bytes, or leave the file unchanged."""
         self._file.seek(self._end)
         try:
             written = 0
@@ -174,13 +177,13 @@ class Journal:
         self._end += len(whole)
 
     def append(self, edges: Edges) -> None:
-        """Keep the edges of some nodes."""
+        """Keep the edges of these nodes."""
         head = RECORD.pack(MARK, edges.source.size, edges.target.size, edges.seconds)
         sizes = _sizes(edges.source.size, edges.target.size)
         arrays = edges.source, edges.degree, edges.target, edges.values, edges.counts
         kinds = [kind for _, kind in sizes]
         body = b"".join(
-            np.ascontiguousarray(one, kind).tobytes() for one, kind in zip(arrays, kinds, strict=True)
+            np.ascontiguousarray(array, kind).tobytes() for array, kind in zip(arrays, kinds, strict=True)
         )
         place = self._end
         self._write(head + body + hashlib.blake2b(head + body, digest_size=DIGEST).digest())
@@ -191,13 +194,13 @@ class Journal:
             self._synced = time.monotonic()
 
     def records(self) -> Iterator[Edges]:
-        """All records, in the order of their first nodes."""
+        """Yield all records in the order of their first nodes."""
         for _, place in sorted(self._places):
             record = self._read(place, self._end)
             if record is None:
-                raise InputError(f"{self.path} has been damaged while it was in use; begin anew with --restart")
+                raise InputError(f"{self.path} was damaged while it was in use; start again with --restart")
             yield record[0]
 
     def remove(self) -> None:
-        """Forget it: the roadmap is in its place."""
+        """Remove the journal; the roadmap is complete."""
         self.path.unlink(missing_ok=True)

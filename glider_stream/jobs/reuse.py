@@ -1,4 +1,4 @@
-"""A change of the water: which nodes of an older roadmap it cannot have touched."""
+"""Reuse after a change of the water: finds the nodes of an older roadmap that the change cannot affect."""
 
 from itertools import pairwise
 from typing import Any
@@ -19,20 +19,20 @@ from ..roadmap.provenance import provenance_of
 from ..roadmap.roadmap import Roadmap
 
 SIDE = 480
-"""Cells along the longer side of the lattice that times are bounded on."""
+"""Times are bounded on a lattice with this many cells along its longer side."""
 DETOUR = 1.0824
-"""A way over eight neighbours is at most so much longer than the straight one: 1 / cos(22.5 degrees)."""
+"""A path over eight neighbours is at most this many times the straight distance: 1 / cos(22.5 degrees)."""
 STEPS = 17
-"""Steps in which the speeds of cells are told apart."""
+"""The speeds of cells are rounded up to this many steps."""
 VALUES = {"values", "max_speed", "level_speed", "level_carry", "bottom", "ground"}
-"""What may differ of two flows, or seabeds, on one grid."""
+"""The fields that may differ between two flows, or seabeds, on one grid."""
 
 
 def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
-    """Which nodes (n,) keep all that `old` says of their edges and pairs, though the flow has changed.
+    """Return which nodes (n,) keep all edges and pairs of the roadmap `old`, although the flow has changed.
 
-    No path from such a node meets the changed water within the horizon: not even one that is carried along
-    by the fastest current of each place. InputError where more has changed than the water.
+    No path from such a node meets the changed water within the horizon, not even if the fastest current of each
+    place carries it along. InputError if more than the water has changed.
     """
     position = node_positions(now)
     made, wanted = old.provenance, provenance_of(now, position)
@@ -45,11 +45,15 @@ def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
         "neighbours": (before.law, now.law),
         "departure": (before.departure, now.departure),
     }
-    unlike = [name for name, (one, other) in what.items() if one != other]
+    unlike = [name for name, (made_with, asked) in what.items() if made_with != asked]
     require(
-        not unlike, f"the older roadmap has other {', '.join(unlike)}, and not only another flow; build afresh"
+        not unlike,
+        f"the older roadmap differs in {', '.join(unlike)}, not only in the flow; build without --from",
     )
-    require(old.node_counts is not None, "the older roadmap does not count the pairs of each node; build afresh")
+    require(
+        old.node_counts is not None,
+        "the older roadmap does not hold the pair counts of each node; build without --from",
+    )
     lattice = _Lattice(before, now, position)
     changed = lattice.changed()
     if changed is None:
@@ -59,12 +63,12 @@ def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
     return lattice.away_from(changed)
 
 
-def _same(one: Any, other: Any) -> bool:
-    return other is not None and np.array_equal(one, other)
+def _same(before: Any, after: Any) -> bool:
+    return after is not None and np.array_equal(before, after)
 
 
 class _Lattice:
-    """Even cells over all the water that paths from the nodes can see."""
+    """Square cells over all the water that paths from the nodes can reach."""
 
     def __init__(self, before: Problem, now: Problem, position: Array) -> None:
         self.before, self.now, self.position = before, now, position
@@ -76,7 +80,7 @@ class _Lattice:
         self.fastest = max(flow.extent.max_speed for flow in self.flows)
         low, high = position[:, :2].min(axis=0), position[:, :2].max(axis=0)
         reach = (self.glide + self.fastest) * self.horizon
-        # beyond the flow itself no path goes on
+        # no path continues outside the flow
         known = self.flows[1].extent
         box = np.array([known.x_lo, known.y_lo]), np.array([known.x_hi, known.y_hi])
         low, high = np.maximum(low - reach, box[0]), np.minimum(high + reach, box[1])
@@ -85,27 +89,27 @@ class _Lattice:
         self.low = low
 
     def changed(self) -> Bools | None:
-        """Cells where flow or terrain differ; None where these cannot be compared point by point."""
+        """Return the cells where flow or terrain differ; None if they cannot be compared point by point."""
         found = np.zeros(tuple(self.count), dtype=bool)
         terrains = self.before.evaluator.terrain, self.now.evaluator.terrain
-        for one, other in (self.flows, terrains):
-            now = fields_of(other)
-            unlike = {name for name, value in fields_of(one).items() if not _same(value, now.get(name))}
-            if type(one) is type(other) and not unlike:
+        for before, after in (self.flows, terrains):
+            now = fields_of(after)
+            unlike = {name for name, value in fields_of(before).items() if not _same(value, now.get(name))}
+            if type(before) is type(after) and not unlike:
                 continue
-            if type(one) is not type(other) or not unlike <= VALUES:
+            if type(before) is not type(after) or not unlike <= VALUES:
                 return None
-            if isinstance(other, (Grid, OceanGrid)) and isinstance(one, (Grid, OceanGrid)):
-                unlike = self._in_time(other, (one.values != other.values).any(axis=-1))
-                found |= self._touched(other, unlike.any(axis=tuple(range(unlike.ndim - 2))))
-            elif isinstance(other, Seabed) and isinstance(one, Seabed):
-                found |= self._touched(other, one.bottom != other.bottom)
+            if isinstance(after, (Grid, OceanGrid)) and isinstance(before, (Grid, OceanGrid)):
+                unlike = self._in_time(after, (before.values != after.values).any(axis=-1))
+                found |= self._touched(after, unlike.any(axis=tuple(range(unlike.ndim - 2))))
+            elif isinstance(after, Seabed) and isinstance(before, Seabed):
+                found |= self._touched(after, before.bottom != after.bottom)
             else:
                 return None
         return found
 
     def _in_time(self, flow: Grid | OceanGrid, values: Any) -> Any:
-        """Of values by time first, those that are read between departure and horizon."""
+        """Return the values, by time first, that are read between departure and horizon."""
         if isinstance(flow, Grid):
             return values
         start = self.now.departure
@@ -113,13 +117,13 @@ class _Lattice:
         return values[first : int(np.searchsorted(flow.times, start + self.horizon)) + 1]
 
     def _touched(self, grid: Grid | OceanGrid | Seabed, points: Bools) -> Bools:
-        """The cells that read one of the grid's `points` (ni, nj)."""
+        """Return the cells that read one of the grid's `points` (ni, nj)."""
         (i, j), (k, m) = self._reads(grid, points.shape)
         sums = np.pad(points.astype(np.int64).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
         return np.asarray(sums[k, m] - sums[i, m] - sums[k, j] + sums[i, j] > 0)
 
     def _reads(self, grid: Grid | OceanGrid | Seabed, shape: tuple[int, ...]) -> tuple[Any, Any]:
-        """The first point of a grid that each cell reads, and that after the last, (2, ni, nj) each."""
+        """Return the first grid point that each cell reads, and the point after the last, (2, ni, nj) each."""
         if id(grid) in self._known:
             return self._known[id(grid)]
         axes = (self.low[n] + self.step * np.arange(self.count[n] + 1) for n in range(2))
@@ -131,7 +135,7 @@ class _Lattice:
                 [map_coordinates(grid.index_map[..., n], at, order=1, mode="nearest") for n in range(2)]
             )
         corners = np.stack([at[:, :-1, :-1], at[:, 1:, :-1], at[:, :-1, 1:], at[:, 1:, 1:]])
-        # a point is read in the cells around it; one more for the bend of a map between corners
+        # a point is read in the cells around it; one more cell covers the curvature of the map between corners
         most = np.array(shape)[:, None, None] - 1
         low = np.clip(np.floor(corners.min(axis=0)).astype(np.int64) - 1, 0, most)
         high = np.clip(np.ceil(corners.max(axis=0)).astype(np.int64) + 1, 0, most) + 1
@@ -139,7 +143,7 @@ class _Lattice:
         return low, high
 
     def away_from(self, changed: Bools) -> Bools:
-        """Nodes from which no path meets a changed cell within the horizon, and no pair looks into one."""
+        """Return the nodes from which no path within the horizon meets a changed cell and no pair reads one."""
         at = np.clip(((self.position[:, :2] - self.low) / self.step).astype(np.int64), 0, self.count - 1)
         soonest = self._soonest(changed)[at[:, 0], at[:, 1]]
         safe = soonest > self.horizon
@@ -157,33 +161,36 @@ class _Lattice:
             others = self.position[legs.neighbourhood.of(self.position[node]), :2]
             away = np.linalg.norm(others - self.position[node, :2], axis=1)
             safe[node] = not straight or gap[node] > away.max(initial=0.0)
-            # which pairs are too far is decided by the fastest current anywhere
+            # the fastest current anywhere decides which pairs are too far
             safe[node] &= near == far or not bool(((away > near - hit) & (away < far + hit)).any())
         return np.asarray(safe)
 
     def _soonest(self, changed: Bools) -> Array:
-        """A bound from below [s] on when a path from each cell can meet a changed one: the way's own fastest."""
+        """Return a lower bound of the time [s] until a path from each cell can meet a changed cell.
+
+        On every part of the way it takes the fastest current there.
+        """
         speed = self.glide + maximum_filter(self._speeds(), size=3, mode="nearest")
         number = np.arange(changed.size).reshape(changed.shape)
         rows, cols, costs = [], [], []
         for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
             here = (slice(None, -di or None), slice(max(0, -dj), None if dj <= 0 else -dj))
-            there = (slice(di, None), slice(max(0, dj), None if dj >= 0 else dj))
-            between = np.maximum(speed[here], speed[there])
+            shifted = (slice(di, None), slice(max(0, dj), None if dj >= 0 else dj))
+            between = np.maximum(speed[here], speed[shifted])
             rows.append(number[here].ravel())
-            cols.append(number[there].ravel())
+            cols.append(number[shifted].ravel())
             costs.append((self.step * np.hypot(di, dj) / between).ravel())
         graph = csr_array(
             (np.concatenate(costs), (np.concatenate(rows), np.concatenate(cols))),
             shape=(changed.size, changed.size),
         )
         time = dijkstra(graph, directed=False, indices=number[changed], min_only=True)
-        # a node, and what it meets, lie anywhere in their cells
+        # a node and the changed water may lie anywhere in their cells
         slack = 1.5 * self.step / float(speed.min())
         return np.asarray((time / DETOUR - slack).reshape(changed.shape))
 
     def _speeds(self) -> Array:
-        """The fastest current that is read in each cell, at any depth and time: at most its grid points' own."""
+        """Return a bound of the fastest current in each cell, at any depth and time."""
         flow = self.flows[1]
         result = np.full(tuple(self.count), flow.extent.max_speed)
         if not isinstance(flow, (Grid, OceanGrid)):

@@ -1,1 +1,1 @@
-"""What pilots work with: files for vehicles and maps, the card, windows, scores of drawn routes."""
+"""What pilots use: files for vehicles and maps, the card, windows, scores of drawn routes."""

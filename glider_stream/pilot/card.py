@@ -1,4 +1,4 @@
-"""The pilot's card: what a route makes over ground, what the water does to it, when it arrives where."""
+"""The pilot's card: speed over ground, currents and times of arrival for each leg of a route."""
 
 import math
 from dataclasses import dataclass
@@ -16,10 +16,11 @@ DAY = 86_400.0
 
 @dataclass(frozen=True)
 class Row:
-    """A leg, or all: duration [s], `over_ground` [m/s], the current `along` its way and `across`, to the left.
+    """A leg, or the whole route.
 
-    `toward_goal` [km/day]; `fastest` current that it meets [m/s], and whether that outruns the vehicle: there
-    it cannot hold station. `arrives` [s since departure].
+    `duration` [s]; `over_ground` [m/s]; the current `along` the way and `across` it, positive to the left [m/s];
+    `toward_goal` [km/day]; `fastest`: the fastest current on the way [m/s]; `outrun`: whether that current is
+    faster than the vehicle, which then cannot hold station; `arrives` [s since departure].
     """
 
     duration: float
@@ -32,7 +33,7 @@ class Row:
     arrives: float
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary for JSON."""
         return {
             "duration_s": self.duration,
             "arrives_s": self.arrives,
@@ -48,7 +49,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Card:
-    """The route's legs, and the whole; `under` water from one surfacing to the next [s]; `best` speed [m/s]."""
+    """The legs of a route and the whole route.
+
+    `under`: times under water from one surfacing to the next [s]; `best`: the vehicle's greatest horizontal speed
+    [m/s].
+    """
 
     path: Path
     legs: tuple[Row, ...]
@@ -57,7 +62,7 @@ class Card:
     best: float
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary for JSON."""
         return {
             "departs": None if self.path.departs is None else self.path.departs.isoformat(),
             "legs": [row.as_dict() for row in self.legs],
@@ -80,7 +85,7 @@ class Card:
         if outrun:
             lines.append(
                 f"* the water is faster than the vehicle's {self.best:.2f} m/s: "
-                f"no holding station on legs {', '.join(outrun)}"
+                f"it cannot hold station on legs {', '.join(outrun)}"
             )
         return "\n".join([*lines, *([FROZEN] if self.path.frozen else [])])
 
@@ -93,12 +98,12 @@ class Card:
 
 
 def daily(speed: float) -> float:
-    """A speed [m/s] in km/day."""
+    """Return a speed [m/s] in km/day."""
     return speed * DAY / 1000
 
 
 def card(path: Path, problem: Problem) -> Card:
-    """The card of a route that was planned in this problem's water."""
+    """Return the card of a route that was planned in the water of this problem."""
     best = float(problem.evaluator.polar.best_horizontal.max())
     legs = tuple(_row(leg, path, problem, best) for leg in path.legs)
     if not legs:
@@ -117,7 +122,7 @@ def card(path: Path, problem: Problem) -> Card:
 
 
 def _under(path: Path) -> tuple[float, ...]:
-    """Times [s] from one surfacing to the next."""
+    """Return the times [s] from one surfacing to the next."""
     ends = [(0.0, path.start[2]), *((leg.depart + leg.duration, leg.end[2]) for leg in path.legs)]
     return tuple(float(time) for time in np.diff([when for when, z in ends if z >= -SURFACE]))
 

@@ -1,6 +1,6 @@
-"""Route files: a path in the forms that other programs read.
+"""Route files: writes a path in the forms that other programs read.
 
-Coordinates are longitude, latitude and altitude (a depth is negative), bearings clockwise from true north.
+Coordinates are longitude, latitude and altitude (a depth is negative). Bearings are clockwise from true north.
 """
 
 import csv
@@ -31,9 +31,10 @@ Texts = dict[str, str]
 
 @dataclass(frozen=True)
 class Options:
-    """How routes are exported: hours a window lasts, waypoints a goto list holds, how near one is reached [m].
+    """Options of an export.
 
-    Where `arrival_radius` is None each vehicle has its own.
+    `hours`: the length of a window [h]. `most_waypoints`: the waypoints that a goto list may hold.
+    `arrival_radius`: the distance [m] at which a waypoint counts as reached; if None, each vehicle has its own.
     """
 
     window_hours: float = HOURS
@@ -51,7 +52,7 @@ def _place(lonlat: Any, z: float) -> list[float]:
 
 
 def _track(path: Path) -> list[list[float]]:
-    """The route's places, every leg's curve."""
+    """Return the positions of the route along the curves of all legs."""
     places = [_place(path.lonlat[0], path.start[2])] if path.lonlat is not None else []
     for leg in path.legs:
         assert leg.track is not None
@@ -59,25 +60,25 @@ def _track(path: Path) -> list[list[float]]:
         places += [
             _place(lonlat, row[3]) for lonlat, row in zip(leg.track[1:-1], leg.trajectory[1:-1], strict=True)
         ]
-        # a leg misses its end by its tolerance, and the next one begins there
+        # a leg may miss its end by the tolerance, and the next leg begins at that end
         places.append(_place(leg.lonlat[1], leg.end[2]))
     return places
 
 
 def _when(path: Path, seconds: float) -> str | None:
-    """The time of day, ISO 8601 in UTC, where the plan knows when it begins."""
+    """Return the time in UTC (ISO 8601), or None if the plan has no date."""
     if path.departs is None:
         return None
     return (path.departs + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _clock(path: Path, seconds: float) -> str:
-    """The time of day where the plan knows it, else the hours since departure."""
+    """Return the time in UTC if the plan has a date, else the hours since departure."""
     return _when(path, seconds) or f"{seconds / 3600:.3f} h"
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
-    """A row for each leg: where and when it ends, how it is flown, what the water does to it."""
+    """Yield a row for each leg: where and when it ends, how it is flown, the current on its way."""
     for n, leg in enumerate(path.legs, 1):
         u, v = _mean_current(leg)
         depths = -leg.trajectory[:, 3]
@@ -103,7 +104,7 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def _mean_current(leg: Leg) -> tuple[float, float]:
-    """What carried the leg beside its own speed, on the average: east and north [m/s]."""
+    """Return the mean current of a leg, east and north [m/s]: its motion less its own speed."""
     along = leg.speed * math.cos(leg.glide_angle)
     x, y = (leg.trajectory[-1, 1:3] - leg.trajectory[0, 1:3]) / max(leg.duration, 1e-9)
     u, v = x - along * math.cos(leg.heading), y - along * math.sin(leg.heading)
@@ -133,7 +134,7 @@ def _geojson(path: Path, name: str, options: Options) -> Texts:
 
 
 def _stops(path: Path) -> Iterator[tuple[dict[str, Any], list[float]]]:
-    """The place where the route begins, and where each leg ends, with its row."""
+    """Yield the position where the route begins and the end of each leg, each with its row."""
     assert path.lonlat is not None
     yield {"name": FIRST, "eta": _clock(path, 0.0)}, _place(path.lonlat[0], path.start[2])
     for row, leg in zip(_rows(path), path.legs, strict=True):
@@ -142,9 +143,9 @@ def _stops(path: Path) -> Iterator[tuple[dict[str, Any], list[float]]]:
 
 
 def _child(parent: Xml.Element, tag: str, text: str | None = None, **attributes: str) -> Xml.Element:
-    one = Xml.SubElement(parent, tag, attributes)
-    one.text = text
-    return one
+    child = Xml.SubElement(parent, tag, attributes)
+    child.text = text
+    return child
 
 
 def _xml(root: Xml.Element, name: str) -> Texts:
@@ -164,8 +165,10 @@ def _kml(path: Path, name: str, options: Options) -> Texts:
     for row, place in list(_stops(path))[1:]:
         mark = _child(document, "Placemark")
         _child(mark, "name", row["name"])
-        said = f"heading {row['heading']} degrees, glide angle {row['glide_angle']} degrees, eta {row['eta']}"
-        _child(mark, "description", said)
+        description = (
+            f"heading {row['heading']} degrees, glide angle {row['glide_angle']} degrees, eta {row['eta']}"
+        )
+        _child(mark, "description", description)
         if path.departs is not None:
             _child(_child(mark, "TimeStamp"), "when", row["eta"])
         point = _child(mark, "Point")
@@ -185,7 +188,7 @@ def _gpx(path: Path, name: str, options: Options) -> Texts:
             _child(point, "time", row["eta"])
         _child(point, "name", row["name"])
     segment = _child(_child(root, "trk"), "trkseg")
-    # the curve's points that are stops have their names, so that a track that is kept alone still is the route
+    # points of the curve that are stops keep their names, so that the track alone still shows the route
     ends = np.cumsum([0, *(len(leg.trajectory) - 1 for leg in path.legs)]).tolist()
     names = {end: row["name"] for end, (row, _) in zip(ends, stops, strict=True)}
     for n, (lon, lat, z) in enumerate(_track(path)):
@@ -196,8 +199,8 @@ def _gpx(path: Path, name: str, options: Options) -> Texts:
     return _xml(root, name)
 
 
-def _said(path: Path, window: Window) -> dict[str, Any]:
-    """When a window is, and how deep the vehicle is there."""
+def _window_properties(path: Path, window: Window) -> dict[str, Any]:
+    """Return the times and depths of a window as properties."""
     return {
         "from": _clock(path, window.start),
         "to": _clock(path, window.end),
@@ -207,25 +210,25 @@ def _said(path: Path, window: Window) -> dict[str, Any]:
 
 
 def _windows_geojson(path: Path, name: str, options: Options) -> Texts:
-    """A polygon for each window; at the date line it is cut in two, as RFC 7946 asks (3.1.9)."""
+    """Return a polygon for each window; it is cut in two at the date line (RFC 7946, section 3.1.9)."""
     features = []
     for window in windows(path, options.window_hours):
         rings = [[[[w, s], [e, s], [e, n], [w, n], [w, s]]] for w, s, e, n in window.outline()]
         shape: dict[str, Any] = {"type": "Polygon", "coordinates": rings[0]}
         if len(rings) > 1:
             shape = {"type": "MultiPolygon", "coordinates": rings}
-        features.append({"type": "Feature", "geometry": shape, "properties": _said(path, window)})
+        features.append({"type": "Feature", "geometry": shape, "properties": _window_properties(path, window)})
     return {name: json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"}
 
 
 def _windows_csv(path: Path, name: str, options: Options) -> Texts:
-    """A row for each window; west of it is above east where it crosses the date line."""
+    """Return a row for each window; west is greater than east if the window crosses the date line."""
     sides = ("x_min", "y_min", "x_max", "y_max") if path.lonlat is None else ("west", "south", "east", "north")
     rows = []
     for window in windows(path, options.window_hours):
         boxes = window.outline()
         box = [round(bound, 6) for bound in (*boxes[0][:2], *boxes[-1][2:])]
-        rows.append({**dict(zip(sides, box, strict=True)), **_said(path, window)})
+        rows.append({**dict(zip(sides, box, strict=True)), **_window_properties(path, window)})
     return _table(rows, name)
 
 
@@ -250,13 +253,13 @@ EXPORTS: dict[str, Callable[[Path, str, Options], Texts]] = {
     ".windows.geojson": _windows_geojson,
     ".windows.csv": _windows_csv,
 }
-"""By a file's ending, or its name: what writes it; a form may need more than one file."""
+"""The function that writes each form, by the file's ending or name; a form may need several files."""
 ANYWHERE = (".json", ".csv", ".windows.csv")
-"""The forms that need no longitude and latitude."""
+"""The forms that do not need longitude and latitude."""
 
 
 def _saying_frozen(form: str, text: str) -> str:
-    """A file of a path whose clock does not run, with words that say so where its readers look."""
+    """Return the text of a file with a note that the path's currents are frozen, where its readers see it."""
     if form.endswith(".json"):
         return text  # its `frozen` says so
     if form.endswith(".geojson"):
@@ -279,7 +282,7 @@ def _form(file: str | File) -> str:
 
 
 def check_export(file: str | File) -> None:
-    """InputError unless the file's ending names a known form, and the file can be made."""
+    """Raise InputError unless the file's ending is a known form and the file can be made."""
     form, known = _form(file), ", ".join(EXPORTS)
     got = repr(form or "no ending")
     require(form in EXPORTS, f"the route file {file} must end in one of: {known}; got {got}")
@@ -289,9 +292,9 @@ def check_export(file: str | File) -> None:
 
 
 def check_legs(path: Path, files: Sequence[str | File]) -> None:
-    """InputError where a path leads from a place to itself, and one of the files would hold legs."""
+    """Raise InputError if the path has no leg and one of the files must hold legs."""
     for file in files:
-        empty = f"the route has no leg, its start is its goal, so there is nothing to write into {file}"
+        empty = f"the route has no leg, because its start is its goal; there is nothing to write into {file}"
         written = bool(path.legs) or not path.found or _form(file) == ".json"
         require(written, f"{empty}; give another goal")
 
@@ -299,10 +302,10 @@ def check_legs(path: Path, files: Sequence[str | File]) -> None:
 def export_path(
     path: Path, file: str | File, say: Callable[[str], None] = lambda note: None, **options: Any
 ) -> list[File]:
-    """Write a path in the form that the file's ending names; returns the files that it took.
+    """Write a path in the form that the file's ending names; return the files that were written.
 
-    Where there is no path only JSON says so; no file of another form is written, and `say` hears of that, and of
-    what was removed. `options` as `Options` has them. InputError where the path has no leg to write.
+    If no path was found, only a JSON file is written; `say` gets a message for every other file, and for every
+    old file that was removed. `options`: see `Options`. InputError if the path has no leg to write.
     """
     check_export(file)
     form, place, chosen = _form(file), File(file), Options(**options)
@@ -310,7 +313,7 @@ def export_path(
     require(geographic, f"the route file {file} needs longitude and latitude; plan in a geographic scenario")
     if not path.found and form != ".json":
         older = "; the file of that name is of an earlier query" if place.exists() else ""
-        say(f"{file} is not written, since there is no path{older}")
+        say(f"{file} is not written, because no path was found{older}")
         return []
     check_legs(path, [file])
     texts = EXPORTS[form](path, place.name, chosen)

@@ -1,4 +1,4 @@
-"""The linter: what is wrong with the files that vehicles fly, ours or a pilot's."""
+"""The linter: finds faults in the files that vehicles fly, ours or a pilot's."""
 
 import re
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from .seaglider import target_faults
 from .slocum_files import MOST_WAYPOINTS, goto_faults, read_mission_file, yo_faults
 
 MOST_TEXT = 1_000_000
-"""A vehicle's file is some kilobytes."""
+"""The largest file [bytes] that is read; a vehicle's file has some kilobytes."""
 
 
 @dataclass(frozen=True)
 class Linted:
-    """A vehicle's file: what it is, and what is wrong with it, a sentence each."""
+    """The result for a vehicle's file: its kind and its faults, one sentence each."""
 
     file: str
     kind: str
@@ -33,7 +33,7 @@ class Linted:
 
 
 def lint(file: str | File, most_waypoints: int = MOST_WAYPOINTS) -> Linted:
-    """Look through a goto list, of `most_waypoints` at most, a yo file or `targets`; InputError for any other."""
+    """Check a goto list (of at most `most_waypoints`), a yo file or `targets`; InputError for other files."""
     require(most_waypoints >= 1, f"a goto list must hold 1 waypoint or more; got {most_waypoints}")
     path = File(file)
     try:
@@ -43,7 +43,7 @@ def lint(file: str | File, most_waypoints: int = MOST_WAYPOINTS) -> Linted:
     require(
         len(content) <= MOST_TEXT, f"the file {path} holds more than {MOST_TEXT:,} bytes; name a vehicle's file"
     )
-    require(b"\0" not in content, f"the file {path} is not a text; name a goto list, a yo file or targets")
+    require(b"\0" not in content, f"the file {path} is not a text file; name a goto list, a yo file or targets")
     text = content.decode("utf-8", errors="replace")
     behavior = read_mission_file(text).behavior
     if behavior == "goto_list":
@@ -52,6 +52,6 @@ def lint(file: str | File, most_waypoints: int = MOST_WAYPOINTS) -> Linted:
         return Linted(str(path), "yo", tuple(yo_faults(text)))
     listed = path.name.lower().startswith("targets") or re.search(r"(?m)^\w+\s.*\blat=.*\blon=", text) is not None
     got = f"the behavior {behavior!r}" if behavior else "neither a behavior_name nor targets"
-    known = "goto lists, yo files and targets are looked through"
+    known = "give a goto list, a yo file or targets"
     require(listed and not behavior, f"the file {path} holds {got}; {known}")
     return Linted(str(path), "targets", tuple(target_faults(text)))

@@ -1,7 +1,7 @@
-"""Columns and properties of route files: which name and unit says what, and the refusal of what nobody knows.
+"""Columns and properties of route files: the meaning of their names and units.
 
-A number that is dropped may be the depth that a vehicle should have flown at. So each name is known to place the
-vehicle, known to place nothing, or refused.
+A number that is ignored may be the depth at which a vehicle should fly. So every name is either known to give a
+position, or known not to give one, or refused.
 """
 
 import csv
@@ -15,7 +15,7 @@ from ..base.errors import InputError
 
 
 class NotARoute(InputError):
-    """Why a file is not a route, and what to do; the reader of the file puts the file's name before it."""
+    """The reason why a file is not a route, and the cure; the reader adds the file's name in front."""
 
 
 NAMES = {
@@ -27,7 +27,7 @@ NAMES = {
     "altitude": ("altitude", "alt", "elevation", "ele"),
     "z": ("z",),
 }
-"""What places a vehicle, and how files call it; a depth counts downward, an altitude upward."""
+"""The names of coordinates in files; a depth counts downward, an altitude upward."""
 HEIGHTS = ("depth", "altitude", "z")
 METRES = {
     **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), 1.0),
@@ -43,7 +43,7 @@ DEGREES = dict.fromkeys(
     ),
     1.0,
 )
-"""Units by how headers write them, and how many metres or degrees each of them is."""
+"""Units as headers write them, in metres or degrees."""
 UNITS = {"lon": DEGREES, "lat": DEGREES}
 _IGNORED = (
     "id fid gid ogc_fid objectid index idx no nr num number n count seq sequence order ord rank row leg "
@@ -59,21 +59,21 @@ _IGNORED = (
     "phonenumber lookat "
 )
 IGNORED = frozenset(_IGNORED.split())
-"""Names of numbers that do not place a vehicle; a route is read without them."""
+"""Names of columns with numbers that do not give a position; they are ignored."""
 MEASURE = re.compile(r"^\s*[-+]?\d+(\.\d*)?\s*(m|km|cm|ft|feet|fathoms?|metres?|meters?|dbar)\s*$", re.IGNORECASE)
-"""A number with the unit of a length behind it."""
+"""A number followed by a unit of length."""
 BRACKETS = re.compile(r"^(.*?)\s*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
 
 
 class Column(NamedTuple):
-    """What a column says: one of NAMES, and by how much its numbers are multiplied to be metres or degrees."""
+    """The meaning of a column: one of NAMES, and the factor from its numbers to metres or degrees."""
 
     role: str
     scale: float
 
 
 def bare_name(header: str) -> tuple[str, str]:
-    """A header's name and its unit, in lower case: `Depth (m)`, `depth [m]` and `depth_m` say the same."""
+    """Return a header's name and unit in lower case: `Depth (m)`, `depth [m]` and `depth_m` are the same."""
     text = " ".join(header.strip().lower().split())
     fits = BRACKETS.match(text)
     if fits:
@@ -85,7 +85,7 @@ def bare_name(header: str) -> tuple[str, str]:
 
 
 def column_of(header: str) -> Column | None:
-    """What a header means; None where its name is not known, NotARoute where its unit is not."""
+    """Return the meaning of a header; None if its name is unknown, NotARoute if its unit is unknown."""
     name, unit = bare_name(header)
     role = next((role for role, names in NAMES.items() if name in names), None)
     if role is None:
@@ -98,7 +98,7 @@ def column_of(header: str) -> Column | None:
 
 
 def number(value: Any) -> float | None:
-    """A finite number, or None: truth values are not numbers, texts of numbers are."""
+    """Return a finite number, or None; texts of numbers count as numbers, truth values do not."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
     try:
@@ -109,18 +109,18 @@ def number(value: Any) -> float | None:
 
 
 def refuse_unknown(header: str, values: Iterable[Any], what: str) -> None:
-    """NotARoute where a name that is not known holds numbers."""
+    """Raise NotARoute if a column with an unknown name holds numbers."""
     name, _ = bare_name(header)
     if name in IGNORED or not any(number(value) is not None or MEASURE.match(str(value)) for value in values):
         return
     raise NotARoute(
-        f"its {what} {header.strip()!r} holds numbers, and their meaning is not known; if they place the vehicle "
+        f"its {what} {header.strip()!r} holds numbers of unknown meaning; if they give the vehicle's position "
         "call it depth (metres, downward) or altitude (metres, upward), else remove it"
     )
 
 
 def told_height(values: Mapping[str, Any], what: str) -> float | None:
-    """The height [m, upward] that the properties of a point say, None where they say nothing of it."""
+    """Return the height [m, upward] in the properties of a point, or None if they hold none."""
     found: dict[str, float] = {}
     for name, value in values.items():
         if value is None or value == "":
@@ -130,7 +130,7 @@ def told_height(values: Mapping[str, Any], what: str) -> float | None:
             refuse_unknown(name, [value], what)
         elif column.role in HEIGHTS and number(value) is None:
             raise NotARoute(
-                f"its {what} {name!r} is {str(value)[:40]!r}, and not a number; write the unit in its name"
+                f"its {what} {name!r} is {str(value)[:40]!r}, which is not a number; write the unit in its name"
             )
         elif column.role == "z":
             raise NotARoute(f"its {what} {name!r} may count up or down; call it depth or altitude")
@@ -138,21 +138,22 @@ def told_height(values: Mapping[str, Any], what: str) -> float | None:
             amount = (number(value) or 0.0) * column.scale
             found[name] = amount if column.role == "altitude" else 0.0 - amount
     if len(set(found.values())) > 1:
-        raise NotARoute(f"its {what}s {', '.join(found)} say different depths of one point; keep one of them")
+        raise NotARoute(f"its {what}s {', '.join(found)} give different depths for one point; keep one of them")
     return next(iter(found.values()), None)
 
 
-def depth_of(third: float | None, told: float | None) -> float:
-    """The depth [m] of a point, of its third coordinate and what its properties say [m, upward]; 0 if neither."""
-    if third and told is not None and third != told:
+def depth_of(third: float | None, property_height: float | None) -> float:
+    """Return a point's depth [m] from its third coordinate and its properties' height [m, upward]; else 0."""
+    if third and property_height is not None and third != property_height:
         raise NotARoute(
-            f"a point has an altitude of {third:g} m and properties that say {told:g} m; keep one of them"
+            f"a point has an altitude of {third:g} m and properties that say {property_height:g} m; "
+            "keep one of them"
         )
-    return 0.0 - (third or told or 0.0)
+    return 0.0 - (third or property_height or 0.0)
 
 
 def csv_points(text: str) -> tuple[list[Any], bool]:
-    """The points of a table with a header, and whether they are lon, lat, depth; else they are x, y, z."""
+    """Return the points of a table with a header, and whether they are lon, lat, depth (else x, y, z)."""
     text = text.lstrip()
     first = text.partition("\n")[0]
     rows = [row for row in csv.reader(io.StringIO(text), delimiter=max(",;\t", key=first.count)) if row]
@@ -165,7 +166,9 @@ def csv_points(text: str) -> tuple[list[Any], bool]:
             continue
         role = "height" if column.role in HEIGHTS else column.role
         if role in where:
-            raise NotARoute(f"its columns {headers[where[role]]!r} and {name!r} say the same; remove one of them")
+            raise NotARoute(
+                f"its columns {headers[where[role]]!r} and {name!r} mean the same; remove one of them"
+            )
         where[role] = n
     for across, along in (("lon", "lat"), ("x", "y")):
         if across in where and along in where:
@@ -173,12 +176,13 @@ def csv_points(text: str) -> tuple[list[Any], bool]:
             break
     else:
         known = ", ".join(name.lower() for name in headers if name and name.isprintable()) or "none"
-        raise NotARoute(f"its columns are {known}, and not lon, lat, depth or x, y, z; name them so")
+        raise NotARoute(f"its columns are {known}; name them lon, lat, depth or x, y, z")
     if len({"lon", "lat", "x", "y"} & set(where)) > 2:
         raise NotARoute("it has columns for lon, lat and for x, y; remove two of them")
-    if "height" not in where and "depth_min" in headers:  # the depths of our own table are those of whole legs
+    if "height" not in where and "depth_min" in headers:  # the depths in our own table are ranges over whole legs
         raise NotARoute(
-            "it says neither where the first leg begins nor how deep legs end; give the .json instead"
+            "it holds neither the start of the first leg nor the depths where legs end; give the .json file "
+            "instead"
         )
     for n, name in enumerate(headers):
         if columns[name] is None:
@@ -189,7 +193,7 @@ def csv_points(text: str) -> tuple[list[Any], bool]:
 def _point(
     row: list[str], headers: list[str], columns: dict[str, Column | None], where: dict[str, int], geographic: bool
 ) -> tuple[Any, Any, Any]:
-    """Three values of a row, in metres and degrees where they are numbers, else as they stand."""
+    """Return three values of a row: metres and degrees if they are numbers, else unchanged."""
     values: list[Any] = []
     for role in ("lon", "lat", "height") if geographic else ("x", "y", "height"):
         if role not in where:

@@ -1,4 +1,4 @@
-"""Routes that somebody drew, out of the files that maps write."""
+"""Reads drawn routes from the files that map programs write."""
 
 import csv
 import json
@@ -19,11 +19,11 @@ from .slocum_files import goto_points
 Place = tuple[float, float, float]
 MOST_TEXT, MOST_POINTS = 20_000_000, 10_000
 BROKEN = ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError
-"""What reading a text raises that is not what its ending says."""
+"""Errors that are raised if a text does not have the form of its ending."""
 
 
 class Found(NamedTuple):
-    """What a file holds: its points, whether they are lon, lat, depth, and what the reader of it must know."""
+    """The contents of a file: points, whether they are lon, lat, depth, and notes for the reader."""
 
     points: list[Any]
     geographic: bool
@@ -34,22 +34,23 @@ class Found(NamedTuple):
 class Drawn:
     """The points of a drawn route, in order.
 
-    Where it is `geographic`: lon, lat [degrees], depth [m], downward; else x, y, z [m] of the local frame.
-    `notes`: what the file leaves open, and what of it was not read.
+    If `geographic`, they are lon, lat [degrees], depth [m, downward]; else x, y, z [m] in the local frame.
+    `notes`: what the file leaves open and what was not read.
     """
 
     places: tuple[Place, ...]
     geographic: bool
     notes: tuple[str, ...] = ()
     of_vehicle: bool = False
-    """Whether a vehicle flies it from wherever it is, so that the way to the first point is not told."""
+    """Whether it is a vehicle's file; the vehicle starts anywhere, so the way to the first point is unknown."""
 
 
 def read_drawn(file: str | Path) -> Drawn:
-    """A drawn route: CSV with a header, GeoJSON, KML, GPX, a path file, a goto list, a Seaglider's targets.
+    """Return the route in a CSV file with a header, GeoJSON, KML, GPX, path file, goto list or `targets`.
 
-    A point without depth lies at the surface. Of our own exports: where the route begins, and where legs end.
-    InputError where there is no point, more than one line, a number that nobody knows, or another file.
+    A point without a depth lies at the surface. From our own exports the route's start and the ends of its legs
+    are read. InputError if there is no point, if there are several lines, if a number has an unknown meaning, or
+    if the file has another form.
     """
     path = Path(file)
     require(path.is_file(), f"the route {path} does not exist; name a file")
@@ -69,10 +70,12 @@ def read_drawn(file: str | Path) -> Drawn:
     except OSError as error:
         raise InputError(f"the route {path} cannot be read: {error.strerror}; name another") from None
     except (*BROKEN, csv.Error, Xml.ParseError) as error:
-        said = " ".join(str(error).split())[:200] if isinstance(error, ValueError | csv.Error) else ""
-        said = said or ("its XML is broken" if isinstance(error, Xml.ParseError) else "it is not built as one is")
-        raise InputError(f"{path.name} cannot be read as a route: {said}; export it again") from None
-    # a vehicle's own list begins where the vehicle is
+        message = " ".join(str(error).split())[:200] if isinstance(error, ValueError | csv.Error) else ""
+        message = message or (
+            "its XML is broken" if isinstance(error, Xml.ParseError) else "it is not built like a route file"
+        )
+        raise InputError(f"{path.name} cannot be read as a route: {message}; export it again") from None
+    # a vehicle flies to the first point of its list, so one point is enough
     least = 1 if form in VEHICLES else 2
     count = f"from {least} to {MOST_POINTS:,} points; got {len(points)}"
     require(least <= len(points) <= MOST_POINTS, f"{path.name} must hold {count}")
@@ -98,7 +101,7 @@ def _json(text: str) -> Found:
     table = json.loads(text)
     if isinstance(table.get("legs"), list):  # a path file of our own, in metres
         if not table["legs"]:
-            raise NotARoute("it holds no leg; give the file of a path that was found")
+            raise NotARoute("it holds no leg; give a file in which a path was found")
         return Found([table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False, [])
     features = table["features"] if table["type"] == "FeatureCollection" else [table]
     lines: list[tuple[list[Any], dict[str, Any]]] = []
@@ -111,12 +114,15 @@ def _json(text: str) -> Found:
         if geometry is None:
             continue
         if geometry["type"] not in ("LineString", "Point"):
-            raise NotARoute(f"it holds a {geometry['type']}, and not a line or points; draw a line")
+            raise NotARoute(f"it holds a {geometry['type']}, which is not a line or points; draw a line")
         (lines if geometry["type"] == "LineString" else points).append((geometry["coordinates"], properties))
     for _, properties in lines:
         _check_line(properties)
-    # what stands beside a line is a mark on the map, and places nothing but where it is ours
-    marks = [_mark(place, {"name": told.get("name", "")} if lines else told) for place, told in points]
+    # points beside a line are marks on the map; they give no positions unless they are ours
+    marks = [
+        _mark(place, {"name": properties.get("name", "")} if lines else properties)
+        for place, properties in points
+    ]
     return Found(route_of([[_below(place, {}) for place in line] for line, _ in lines], marks, ours), True, [])
 
 
@@ -126,7 +132,7 @@ def _mark(place: Any, properties: dict[str, Any]) -> Mark:
 
 
 def _check_line(properties: dict[str, Any]) -> None:
-    """NotARoute where a line's properties say how deep it lies: they would say it of all its points at once."""
+    """Raise NotARoute if a line's properties give a depth, which would hold for all of its points."""
     for name, value in properties.items():
         column = None if value is None else column_of(name)
         if column is not None and column.role in HEIGHTS:
@@ -137,9 +143,9 @@ def _check_line(properties: dict[str, Any]) -> None:
 
 
 def _below(place: Any, properties: dict[str, Any]) -> tuple[Any, Any, float]:
-    """lon, lat and an altitude as lon, lat, depth, which properties may say, too."""
-    told = told_height(properties, "property")
-    return place[0], place[1], depth_of(place[2] if len(place) > 2 else None, told)
+    """Return lon, lat, depth of a point with an altitude; its properties may also give the depth."""
+    height = told_height(properties, "property")
+    return place[0], place[1], depth_of(place[2] if len(place) > 2 else None, height)
 
 
 def _kml(text: str) -> Found:
@@ -170,6 +176,6 @@ FORMS: dict[str, Callable[[str], Found]] = {
     ".ma": _goto,
     "targets": _targets,
 }
-"""By a file's ending, or its name: what reads its points."""
+"""The function that reads the points of each form, by the file's ending or name."""
 VEHICLES = (".ma", "targets")
-"""The forms that vehicles fly, from wherever they are."""
+"""The forms that vehicles fly; they start wherever they are."""

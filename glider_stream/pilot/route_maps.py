@@ -1,4 +1,4 @@
-"""Routes in KML and GPX, as maps and plotters write them."""
+"""Reads routes in KML and GPX, as map programs and plotters write them."""
 
 import re
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ CONTAINERS = ("kml", "Document", "Folder")
 LINES = ("LineString", "Track")
 OUR_NAME = "glider-stream route"
 FIRST, STOP = "START", "WP{:03}"
-"""How our files call the place where a route begins, and the ends of its legs, counted from 1."""
+"""The names in our files of the route's start and of the ends of its legs, counted from 1."""
 OURS = re.compile(r"START|WP\d+")
 
 
@@ -23,7 +23,7 @@ class Mark(NamedTuple):
 
 
 def our_stops(marks: list[Mark]) -> list[Mark]:
-    """The marks that are named as our files name a route's stops, in their order; none where one is missing."""
+    """Return the marks that have our names of a route's stops, in their order; no mark if one is missing."""
     by_name = {mark.name: mark for mark in marks}
     first = [by_name[FIRST]] if FIRST in by_name else []
     stops: list[Mark] = []
@@ -34,17 +34,19 @@ def our_stops(marks: list[Mark]) -> list[Mark]:
 
 
 def route_of(lines: list[list[Place]], marks: list[Mark], ours: bool) -> list[Place]:
-    """The route among lines and points: a line that is alone, and points beside it are marks on a map.
+    """Return the route among lines and points: a line if there is just one; points beside it are marks on a map.
 
-    Of our files the line is the curved track, and the route is where it begins and where its legs end: also
-    where another program saved it again, and kept but our marks' names and places.
+    In our own files the line is the curved track, and the route is its start and the ends of its legs. This also
+    holds if another program saved the file and kept only the names and positions of our marks.
     """
     if len(lines) > 1:
-        raise NotARoute(f"it holds {len(lines)} lines, and a route is one; keep one of them")
+        raise NotARoute(f"it holds {len(lines)} lines, but a route is one line; keep one of them")
     stops = our_stops(marks)
     if not lines:
         if stops and stops[0].name != FIRST and len(stops) == len(marks):
-            raise NotARoute("it holds where our legs end, and not where the route begins; export the route again")
+            raise NotARoute(
+                "it holds the ends of our legs but not the start of the route; export the route again"
+            )
         return [mark.place for mark in marks]
     if stops and (ours or _along(lines[0], stops)):
         begins = [] if stops[0].name == FIRST else [lines[0][0]]
@@ -53,7 +55,7 @@ def route_of(lines: list[list[Place]], marks: list[Mark], ours: bool) -> list[Pl
 
 
 def _along(line: list[Place], stops: list[Mark]) -> bool:
-    """Whether all stops are points of the line, in its order, and the last one is its end."""
+    """Return whether all stops are points of the line, in its order, and the last stop is its end."""
     at = 0
     for stop in stops:
         while at < len(line) and not _same(line[at], stop.place):
@@ -64,37 +66,37 @@ def _along(line: list[Place], stops: list[Mark]) -> bool:
 
 
 def _same(a: Place, b: Place) -> bool:
-    """Equal but for rounding, and for a turn at the date line."""
+    """Return whether two places are equal, except for rounding and for a full circle at the date line."""
     across = (float(a[0]) - float(b[0]) + 180.0) % 360.0 - 180.0
     return abs(across) < 2e-6 and abs(float(a[1]) - float(b[1])) < 2e-6 and abs(float(a[2]) - float(b[2])) < 0.5
 
 
 def _tree(text: str) -> Xml.Element:
-    # entities are declared in a document type, and only there
+    # entities can be declared only in a document type
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise NotARoute("it declares a document type, which is not read; export it again without")
+        raise NotARoute("it declares a document type, which is not read; export it again without one")
     return Xml.fromstring(text)
 
 
 def _kind(element: Xml.Element) -> str:
-    """An element's name, whatever its namespace."""
+    """Return an element's name without its namespace."""
     return element.tag.rsplit("}", 1)[-1]
 
 
 def _named(tree: Xml.Element, name: str) -> list[Xml.Element]:
-    return [one for one in tree.iter() if _kind(one) == name]
+    return [element for element in tree.iter() if _kind(element) == name]
 
 
 def _text(tree: Xml.Element, name: str) -> str:
-    """The text of the first child of that name, empty if there is none."""
-    return next(((one.text or "").strip() for one in tree if _kind(one) == name), "")
+    """Return the text of the first child with that name, or an empty text."""
+    return next(((element.text or "").strip() for element in tree if _kind(element) == name), "")
 
 
 # KML
 
 
 class _Shape(NamedTuple):
-    """A line or a point of a KML file: the placemark and the folder that it stands in, if any."""
+    """A line or a point of a KML file, with its placemark and folder, if it has them."""
 
     element: Xml.Element
     placemark: Xml.Element | None
@@ -102,7 +104,7 @@ class _Shape(NamedTuple):
 
 
 def _shapes(tree: Xml.Element) -> list[_Shape]:
-    """All lines and points, in the order of the file; without recursion, since a file may be deep."""
+    """Return all lines and points in the order of the file; without recursion, since a file may be deep."""
     found, waiting = [], [_Shape(tree, None, tree)]
     while waiting:
         element, placemark, folder = waiting.pop()
@@ -117,13 +119,13 @@ def _shapes(tree: Xml.Element) -> list[_Shape]:
 
 
 def kml_points(text: str) -> tuple[list[Place], list[str]]:
-    """The route of a KML file, lon, lat [degrees], depth [m], and what was left out of it."""
+    """Return the route of a KML file as lon, lat [degrees], depth [m], and notes on what was left out."""
     tree, notes = _tree(text), list[str]()
     shapes = _shapes(tree)
     lines = [shape for shape in shapes if _kind(shape.element) in LINES]
     points = [shape for shape in shapes if _kind(shape.element) == "Point"]
     if lines:
-        # what stands in other folders was not drawn with the line
+        # points in other folders were not drawn together with the line
         points = [shape for shape in points if shape.folder is lines[0].folder]
     folders = list({id(shape.folder): shape.folder for shape in points}.values())
     if len(folders) > 1:
@@ -131,11 +133,11 @@ def kml_points(text: str) -> tuple[list[Place], list[str]]:
             repr(_text(folder, "name") or "without a name") for folder in folders if folder is not None
         )
         raise NotARoute(
-            f"its points lie in {len(folders)} folders ({names}), and a route is one; keep one of them"
+            f"its points lie in {len(folders)} folders ({names}), but a route is in one folder; keep one of them"
         )
-    ours = any(one.text == OUR_NAME for one in _named(tree, "name"))
+    ours = any(element.text == OUR_NAME for element in _named(tree, "name"))
     if lines:
-        # any other is a mark on the map, and how high it stands is nobody's concern
+        # any other point is a mark on the map, and its height does not matter
         points = [shape for shape in points if OURS.fullmatch(_name(shape))]
     marks = [mark for shape in points for mark in _marked(shape, notes)]
     found = route_of([_coordinates(shape, notes) for shape in lines], marks, ours)
@@ -149,37 +151,39 @@ def _name(shape: _Shape) -> str:
 
 
 def _marked(shape: _Shape, notes: list[str]) -> list[Mark]:
-    """The places of a point's element."""
-    told = None if shape.placemark is None else told_height(_data(shape.placemark), "data")
+    """Return the points of an element."""
+    height = None if shape.placemark is None else told_height(_data(shape.placemark), "data")
     places = _coordinates(shape, notes)
-    return [Mark(_name(shape), (a, b, depth_of(0.0 - depth, told))) for a, b, depth in places]
+    return [Mark(_name(shape), (a, b, depth_of(0.0 - depth, height))) for a, b, depth in places]
 
 
 def _data(placemark: Xml.Element) -> dict[str, str]:
-    """What a placemark's ExtendedData say, by name."""
-    data = {one.get("name", ""): _text(one, "value") for one in _named(placemark, "Data")}
-    return data | {one.get("name", ""): (one.text or "").strip() for one in _named(placemark, "SimpleData")}
+    """Return the values in a placemark's ExtendedData, by name."""
+    data = {element.get("name", ""): _text(element, "value") for element in _named(placemark, "Data")}
+    return data | {
+        element.get("name", ""): (element.text or "").strip() for element in _named(placemark, "SimpleData")
+    }
 
 
 def _coordinates(shape: _Shape, notes: list[str]) -> list[Place]:
-    """The places of a line or point: lon, lat, and the depth that the altitude mode gives them."""
+    """Return the places of a line or point: lon, lat, and the depth by the altitude mode."""
     element = shape.element
     if _kind(element) == "Track":
-        values = [[float(value) for value in (one.text or "").split()] for one in _named(element, "coord")]
+        values = [[float(value) for value in (child.text or "").split()] for child in _named(element, "coord")]
     else:
-        texts = " ".join(one.text or "" for one in _named(element, "coordinates"))
+        texts = " ".join(child.text or "" for child in _named(element, "coordinates"))
         values = [[float(value) for value in place.split(",")] for place in texts.split()]
     if _kind(element) in LINES and shape.placemark is not None:
         height = told_height(_data(shape.placemark), "data")
         if height is not None:
-            raise NotARoute("its line has data that say one depth; write it as the altitude of each point")
+            raise NotARoute("its line has data with one depth; write the depth as the altitude of each point")
     heights = [value[2] if len(value) > 2 else 0.0 for value in values]
     counted = _heights(_text(element, "altitudeMode") or "clampToGround", heights, notes)
     return [(value[0], value[1], 0.0 - height) for value, height in zip(values, counted, strict=True)]
 
 
 def _heights(mode: str, heights: list[float], notes: list[str]) -> list[float]:
-    """Heights above the sea [m] of altitudes in an altitude mode (KML 2.2, and Google's two of the seabed)."""
+    """Return heights above the sea [m] for altitudes in an altitude mode (KML 2.2 or Google's of the seabed)."""
     if mode == "absolute":
         return heights
     raised = any(height != 0.0 for height in heights)
@@ -202,21 +206,23 @@ def _heights(mode: str, heights: list[float], notes: list[str]) -> list[float]:
 
 
 def gpx_points(text: str) -> list[Place]:
-    """The route of a GPX file, lon, lat [degrees], depth [m]: its route, else its track, else its way points."""
+    """Return the route of a GPX file, lon, lat [degrees], depth [m]: its route, else track, else way points."""
     tree = _tree(text)
-    routes, tracks = ([_gpx_marks(one, f"{kind}pt") for one in _named(tree, kind)] for kind in ("rte", "trk"))
+    routes, tracks = ([_gpx_marks(line, f"{kind}pt") for line in _named(tree, kind)] for kind in ("rte", "trk"))
     routes, tracks = ([marks for marks in some if marks] for some in (routes, tracks))
     for some, what in ((routes, "routes"), (tracks, "tracks")):
         if len(some) > 1 and (some is routes or not routes):
-            raise NotARoute(f"it holds {len(some)} {what}, and a route is one; keep one of them")
+            raise NotARoute(f"it holds {len(some)} {what}, but only one can be read; keep one of them")
     marks = (routes or tracks or [_gpx_marks(tree, "wpt")])[0]
     stops = our_stops(marks)
     if stops and stops[0].name == FIRST:
         return [stop.place for stop in stops]
     if stops and len(stops) == len(marks):
-        # a route of an earlier version: its track alone holds where it begins
+        # a route of an earlier version: only its track holds the start
         if not tracks:
-            raise NotARoute("it holds where our legs end, and not where the route begins; export the route again")
+            raise NotARoute(
+                "it holds the ends of our legs but not the start of the route; export the route again"
+            )
         return [tracks[0][0].place, *(stop.place for stop in stops)]
     if not marks:
         raise NotARoute("it holds no route point, way point or track point; draw a route, and export that")
@@ -224,14 +230,14 @@ def gpx_points(text: str) -> list[Place]:
 
 
 def _gpx_marks(tree: Xml.Element, kind: str) -> list[Mark]:
-    """Points of GPX with their names."""
+    """Return the points of GPX with their names."""
     marks = []
-    for one in _named(tree, kind):
-        leaves = [inner for inner in one.iter() if len(inner) == 0 and inner is not one]
+    for point in _named(tree, kind):
+        leaves = [inner for inner in point.iter() if len(inner) == 0 and inner is not point]
         values = {_kind(inner): (inner.text or "").strip() for inner in leaves}
         height = values.pop("ele", "")
         name = values.pop("name", "")
-        told = told_height(values, "point's element")
-        depth = depth_of(float(height) if height else None, told)
-        marks.append(Mark(name, (float(one.attrib["lon"]), float(one.attrib["lat"]), depth)))
+        stated = told_height(values, "point's element")
+        depth = depth_of(float(height) if height else None, stated)
+        marks.append(Mark(name, (float(point.attrib["lon"]), float(point.attrib["lat"]), depth)))
     return marks

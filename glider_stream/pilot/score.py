@@ -1,4 +1,4 @@
-"""Scoring a drawn route: how long each leg takes, or the one that fails and why."""
+"""Scores a drawn route: how long each leg takes, or which leg fails and why."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ REASONS = {
     Status.NO_HIT: "no glide angle and heading lead there; move the stop with the current, or change its depth",
     Status.BLOCKED: "every glide there touches land, seabed or a keep-out area; move it into open water",
     Status.OUTSIDE_FLOW: "one of its ends lies outside the current's grid; stay within the domain",
-    Status.SAME_DEPTH: "one glide changes depth and its ends lie at the same, and the roadmap has no way between;"
+    Status.SAME_DEPTH: "one glide changes depth, its ends lie at the same, and the roadmap has no way between;"
     " put a stop at another depth between",
 }
-"""Why a leg fails, and what to try."""
+"""The reason why a leg fails, and the cure."""
 
 
 @dataclass(frozen=True)
 class ScoredLeg:
-    """From `start` to `end` (3,) [m]: its time [s], the glides that it takes, none where it fails, and why."""
+    """A leg from `start` to `end` (3,) [m]: its time [s] and number of glides (0 if it fails), and its status."""
 
     start: Array
     end: Array
@@ -34,15 +34,15 @@ class ScoredLeg:
 
     @property
     def why(self) -> str:
-        """Why it fails, and what to try; empty where it does not."""
+        """The reason why it fails, and the cure; empty if it does not fail."""
         return "" if self.time is not None else REASONS[self.status]
 
 
 @dataclass(frozen=True)
 class Score:
-    """The legs up to the first that fails, of `asked`; `flown`, all their glides, where there are any.
+    """The score: the legs up to the first that fails, of `asked` legs.
 
-    `notes`: what the route's file leaves open, and what of it was not read.
+    `flown`: all their glides, if there are any. `notes`: what the route's file leaves open and what was not read.
     """
 
     legs: tuple[ScoredLeg, ...]
@@ -52,12 +52,12 @@ class Score:
 
     @property
     def flyable(self) -> bool:
-        """Whether all of the route can be flown."""
+        """Whether the whole route can be flown."""
         return len(self.legs) == self.asked and all(leg.time is not None for leg in self.legs)
 
     @property
     def time(self) -> float:
-        """Of the legs that can be flown [s]."""
+        """Total time [s] of the legs that can be flown."""
         return sum(leg.time for leg in self.legs if leg.time is not None)
 
     def as_dict(self) -> dict[str, Any]:
@@ -93,12 +93,12 @@ class Score:
         still = [FROZEN] if self.flown is not None and self.flown.frozen else []
         lines = [title, *(f"  note: {note}" for note in (*self.notes, *still))]
         for n, leg in enumerate(self.legs, 1):
-            said = "fails"
+            summary = "fails"
             if leg.time is not None:
-                said = f"{span(leg.time)}, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
+                summary = f"{span(leg.time)}, {leg.glides} glide{'' if leg.glides == 1 else 's'}"
             if leg.status == Status.SAME_DEPTH and leg.glides:
-                said += " of the roadmap: one glide changes depth, and its ends lie at the same"
-            lines += [f"  leg {n}: {said}", *(f"    {next(glides).told(departs)}" for _ in range(leg.glides))]
+                summary += " of the roadmap: one glide changes depth, and the leg's ends lie at the same depth"
+            lines += [f"  leg {n}: {summary}", *(f"    {next(glides).told(departs)}" for _ in range(leg.glides))]
         return "\n".join(lines)
 
 
@@ -108,10 +108,11 @@ def score(
     query: Callable[[Array, Array, float], Path],
     fly: Callable[[list[Hop]], Path],
 ) -> Score:
-    """Fly a drawn route: one glide between points at other depths, the best way of the roadmap between others.
+    """Return the score of a drawn route.
 
-    `points` (3,) [m]. As in a query every glide begins when the last one ends: `connect` and `query` take the
-    seconds since departure.
+    Between points at different depths there is one glide; between points at the same depth, the best way of the
+    roadmap. `points` (n, 3) [m]. Every glide begins when the last one ends, as in a query: `connect` and `query`
+    get the seconds since departure.
     """
     legs: list[ScoredLeg] = []
     hops: list[Hop] = []

@@ -1,4 +1,4 @@
-"""Seaglider's `targets` file: waypoints, each naming the next; written, read, looked through for faults."""
+"""Seaglider's `targets` file, in which each waypoint names the next: writes it, reads it, finds its faults."""
 
 import math
 import re
@@ -11,18 +11,18 @@ from .route_columns import NotARoute
 from .waypoints import degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 RADIUS = 200.0
-"""A target counts as reached this near [m], unless the pilot says otherwise."""
+"""A target counts as reached at this distance [m], unless the pilot gives another."""
 MOST_TARGETS = 999
 NEEDED = ("lat", "lon", "radius", "goto")
 OPTIONAL = {"escape": None, "depth": (-2000.0, 2000.0), "finish": (-1.0, 360.0), "timeout": (0.0, 365.0)}
-"""What else a target may say, and between what: metres of a contour, degrees, days."""
+"""Other keys of a target and their ranges: metres of a contour, degrees, days."""
 
 
 def targets(path: Path, name: str, radius: float = RADIUS) -> dict[str, str]:
-    """A route as a targets file; the last target is held."""
-    require(0 < radius < math.inf, f"a target must be reached within more than 0 m; got {radius:g}")
+    """Return a route as a targets file; the vehicle stays at the last target."""
+    require(0 < radius < math.inf, f"the arrival radius of a target must be above 0 m; got {radius:g}")
     places = waypoints(path)
-    most = f"{len(places)} targets are more than {MOST_TARGETS}; plan fewer surfacings"
+    most = f"{len(places)} targets are more than the {MOST_TARGETS} that a file may hold; plan fewer surfacings"
     require(len(places) <= MOST_TARGETS, most)
     names = [f"WP{n:03}" for n in range(1, len(places) + 1)]
     lines = [
@@ -34,15 +34,15 @@ def targets(path: Path, name: str, radius: float = RADIUS) -> dict[str, str]:
 
 
 class Target(NamedTuple):
-    """A line of a targets file: its number, the target's name, and what it says by key."""
+    """A line of a targets file: its number, the target's name, and its values by key."""
 
     line: int
     name: str
-    said: dict[str, str]
+    values: dict[str, str]
 
 
 def read_targets(text: str) -> tuple[list[Target], list[str]]:
-    """The targets of a file, and what is wrong with its lines; comments begin with a slash."""
+    """Return the targets of a file and the faults of its lines; comments begin with a slash."""
     found, faults = [], list[str]()
     for n, line in enumerate(text.splitlines(), 1):
         if not line.isascii():
@@ -53,41 +53,39 @@ def read_targets(text: str) -> tuple[list[Target], list[str]]:
             faults.append(f"line {n} begins or ends with a blank")
         # public files have blanks after an equals sign
         name, *parts = re.sub(r"\s*=\s*", "=", line.strip()).split()
-        said = dict(part.split("=", 1) for part in parts if "=" in part)
-        if len(said) < len(parts) or "=" in name:
+        values = dict(part.split("=", 1) for part in parts if "=" in part)
+        if len(values) < len(parts) or "=" in name:
             faults.append(f"line {n} must be a name and key=value, each key once: {line.strip()!r}")
-        found.append(Target(n, name, said))
+        found.append(Target(n, name, values))
     return found, faults
 
 
 def target_faults(text: str) -> list[str]:
-    """What is wrong with a targets file, a sentence each; none where it can be flown."""
+    """Return the faults of a targets file, one sentence each; no fault if it can be flown."""
     found, faults = read_targets(text)
     names = [target.name for target in found]
     if not found:
         faults.append("there is no target")
     for target in found:
-        where, said = f"target {target.name} in line {target.line}", target.said
+        where, values = f"target {target.name} in line {target.line}", target.values
         if names.count(target.name) > 1 and names.index(target.name) < found.index(target):
-            faults.append(f"{where} stands twice")
+            faults.append(f"{where} is given twice")
         if not re.fullmatch(r"\w+", target.name):
             faults.append(f"{where} must have a name of letters and numbers")
         for key in NEEDED:
-            if key not in said:
+            if key not in values:
                 faults.append(f"{where} has no {key}")
-        for key in said:
+        for key in values:
             if key not in (*NEEDED, *OPTIONAL):
-                faults.append(f"{where} says {key}, which is not known; look at its spelling")
+                faults.append(f"{where} has the unknown key {key}; check its spelling")
         for key in ("goto", "escape"):
-            if key in said and said[key] not in names:
-                faults.append(f"{where} has {key}={said[key]}, and there is no such target")
+            if key in values and values[key] not in names:
+                faults.append(f"{where} has {key}={values[key]}, but that target does not exist")
         for key, most in (("lat", 90.0), ("lon", 180.0)):
-            faults += _angle_fault(where, key, said.get(key), most)
+            faults += _angle_fault(where, key, values.get(key), most)
         for key, bounds in {"radius": (1e-3, 1e6), **OPTIONAL}.items():
-            if bounds is not None and key in said and not _within(said[key], *bounds):
-                faults.append(
-                    f"{where} has {key}={said[key]}, and it must be from {bounds[0]:g} to {bounds[1]:g}"
-                )
+            if bounds is not None and key in values and not _within(values[key], *bounds):
+                faults.append(f"{where} has {key}={values[key]}; it must be from {bounds[0]:g} to {bounds[1]:g}")
     return faults
 
 
@@ -99,36 +97,36 @@ def _within(text: str, least: float, most: float) -> bool:
 
 
 def _angle_fault(where: str, key: str, text: str | None, most: float) -> list[str]:
-    """What is wrong with an angle in degrees and minutes."""
+    """Return the faults of an angle in degrees and minutes."""
     if text is None:
         return []
     try:
         angle = from_degrees_and_minutes(text)
     except ValueError as error:
-        return [f"{where} has {key}={text}, and it must be degrees and minutes, (D)DDMM.m: {error}"]
+        return [f"{where} has {key}={text}; it must be degrees and minutes, (D)DDMM.m: {error}"]
     return [] if abs(angle) <= most else [f"{where} has {key}={text}, {angle:g} degrees; at most {most:g}"]
 
 
 def target_points(text: str) -> tuple[list[tuple[float, float, float]], list[str]]:
-    """The targets from the first on as lon, lat [degrees], depth 0 [m], each by the one before, and what is open.
+    """Return the targets in flown order as lon, lat [degrees], depth 0 [m], and notes on what is open.
 
-    NotARoute where the vehicle would not fly them.
+    NotARoute if the vehicle would not fly them.
     """
     faults = target_faults(text)
     if faults:
-        raise NotARoute(f"{faults[0]}; `glider-stream lint` says all that is wrong with it")
+        raise NotARoute(f"{faults[0]}; `glider-stream lint` shows all its faults")
     found, _ = read_targets(text)
     by_name = {target.name: target for target in found}
     way: list[str] = []
     name = found[0].name
     while name not in way:
         way.append(name)
-        name = by_name[name].said["goto"]
+        name = by_name[name].values["goto"]
     notes = [f"the targets begin with {way[0]}, the first of the file; the vehicle may be sent to another"]
     left = [target.name for target in found if target.name not in way]
     if left:
         notes.append(f"no goto leads from {way[0]} to {', '.join(left)}; they are not part of the route")
     if name != way[-1]:
         notes.append(f"the targets are flown again and again, from {name}; they are read once")
-    places = [[from_degrees_and_minutes(by_name[one].said[key]) for key in ("lon", "lat")] for one in way]
+    places = [[from_degrees_and_minutes(by_name[target].values[key]) for key in ("lon", "lat")] for target in way]
     return [(lon, lat, 0.0) for lon, lat in places], notes

@@ -1,7 +1,7 @@
 """Slocum mission files of a route: goto lists of waypoints, and the yo between them.
 
-A waypoint carries no depth and a yo one envelope, so a plan with a trim for each leg is not fully expressible
-here; a vehicle with `u_use_current_correction` steers for itself, by waypoints, not by our headings.
+A waypoint has no depth and a yo has one range of depths, so these files cannot hold a plan with a trim for each
+leg. A vehicle with `u_use_current_correction` steers by waypoints, not by our headings.
 """
 
 import math
@@ -17,18 +17,18 @@ from .slocum_files import LEAST_DEPTH, LEAST_RADIUS, MOST_DEPTH, MOST_WAYPOINTS,
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 RADIUS = 500.0
-"""A waypoint counts as reached this near [m], unless the pilot says otherwise."""
+"""A waypoint counts as reached at this distance [m], unless the pilot gives another."""
 NAME = re.compile(r"goto_l(\d\d)\.ma")
 SERIES = re.compile(r"# written by glider-stream: list (\d+) of the route that begins in (goto_l\d\d\.ma)")
-"""The comment by which a list of ours is known again."""
+"""The comment that marks our own lists."""
 ALTITUDE = 5
-"""The vehicle turns this far above the bottom [m] whatever the plan: masterdata's value."""
+"""The vehicle turns this far above the bottom [m] in any plan: masterdata's value."""
 STEEPEST = math.radians(26.0)
-"""The pitch of either half where the route has no leg of it: masterdata's value."""
+"""The pitch of the dive or climb if the route has no such leg: masterdata's value."""
 
 
 def list_number(name: str) -> int:
-    """The NN of goto_lNN.ma; InputError where the name is another."""
+    """Return the NN of goto_lNN.ma; InputError for any other name."""
     fits = NAME.fullmatch(name)
     require(fits is not None, f"a Slocum goto list must be called goto_lNN.ma, NN two digits; got {name}")
     assert fits is not None
@@ -40,22 +40,26 @@ def _list_name(number: int) -> str:
 
 
 def mission_files(path: Path, name: str, most: int = MOST_WAYPOINTS, radius: float = RADIUS) -> dict[str, str]:
-    """A route as numbered goto lists of `most` waypoints each, the first called `name`, and one yo file."""
+    """Return a route as goto lists of at most `most` waypoints, the first named `name`, and one yo file."""
     require(1 <= most <= 99, f"a goto list must hold from 1 to 99 waypoints; got {most}")
-    least = f"a waypoint must be reached within {LEAST_RADIUS:g} m or more; got {radius:g}"
+    least = f"the arrival radius of a waypoint must be at least {LEAST_RADIUS:g} m; got {radius:g}"
     require(LEAST_RADIUS <= radius < math.inf, least)
     places, first = waypoints(path), list_number(name)
     parts = [places[n : n + most] for n in range(0, len(places), most)]
     last = first + len(parts) - 1
-    require(last <= 99, f"{len(places)} waypoints need the lists {first} to {last}, past 99; begin lower")
+    require(
+        last <= 99,
+        f"{len(places)} waypoints need the lists {first} to {last}, but 99 is the last; begin with a lower "
+        "number",
+    )
     lists = {_list_name(first + n): goto_list(part, radius, n + 1, name) for n, part in enumerate(parts)}
     return lists | {f"yo{first:02}.ma": yo(path)}
 
 
 def goto_list(places: list[Waypoint], radius: float = RADIUS, part: int = 1, name: str = "goto_l10.ma") -> str:
-    """The text of a goto list: longitude first, degrees and minutes packed; flown once, in order.
+    """Return the text of a goto list: longitude first, degrees and minutes packed; flown once, in order.
 
-    It says which `part` it is of the route whose first list has a `name`.
+    A comment tells which `part` it is of the route whose first list has the name `name`.
     """
     rows = [f"{degrees_and_minutes(float(wrapped(at.lon, 0.0)))}\t{degrees_and_minutes(at.lat)}" for at in places]
     return "\n".join([
@@ -76,16 +80,17 @@ def goto_list(places: list[Waypoint], radius: float = RADIUS, part: int = 1, nam
 
 
 def yo(path: Path) -> str:
-    """The text of a yo file: the envelope of the route's legs, within what a Slocum can be told.
+    """Return the text of a yo file: the range of depths of the route's legs, within a Slocum's limits.
 
-    It never dives below the plan. InputError where the route is deeper than the vehicle goes, or where no yo is.
+    It never dives below the plan. InputError if the route is deeper than the vehicle goes, or too shallow for a
+    yo.
     """
     depth = [-float(z) for leg in path.legs for z in (leg.start[2], leg.end[2])]
     deep, planned = math.floor(10 * max(depth) + 1e-6) / 10, max(0.0, min(depth))
     shallow = max(LEAST_DEPTH, math.ceil(10 * planned - 1e-6) / 10)
-    limit = f"the route dives to {max(depth):g} m, and a Slocum's yo ends at {MOST_DEPTH:g} m; plan no deeper"
+    limit = f"the route dives to {max(depth):g} m, but a Slocum's yo ends at {MOST_DEPTH:g} m; plan no deeper"
     require(deep <= MOST_DEPTH, limit)
-    room = f"the route stays between {planned:g} and {max(depth):g} m, and a Slocum's yo turns at {LEAST_DEPTH:g}"
+    room = f"the route stays between {planned:g} and {max(depth):g} m, but a Slocum's yo turns at {LEAST_DEPTH:g}"
     require(deep > shallow, f"{room} m and more; plan deeper, or write a file of another kind")
     dives = [leg.glide_angle for leg in path.legs if leg.glide_angle < 0] or [-STEEPEST]
     climbs = [leg.glide_angle for leg in path.legs if leg.glide_angle > 0] or [STEEPEST]
@@ -117,12 +122,11 @@ def _range(angles: list[float]) -> str:
 
 
 def clear_leftovers(folder: File, first: str, written: list[str]) -> list[str]:
-    """Remove the lists of an earlier, longer route of the same `first` name; a sentence for each that matters.
+    """Remove the lists of an earlier, longer route with the same `first` name; return a message for each.
 
-    A list is removed where it is, to the letter, what this program writes. One that was changed by hand since is
-    the pilot's, and stays.
+    A list is removed only if it is exactly what this program wrote. A list that was changed by hand stays.
     """
-    said, number = list[str](), list_number(first) + sum(1 for name in written if NAME.fullmatch(name))
+    messages, number = list[str](), list_number(first) + sum(1 for name in written if NAME.fullmatch(name))
     while number <= 99 and (file := folder / _list_name(number)).is_file():
         text = file.read_bytes()[:1_000_000].decode("utf-8", errors="replace")
         series = SERIES.search(text)
@@ -130,19 +134,20 @@ def clear_leftovers(folder: File, first: str, written: list[str]) -> list[str]:
             break
         if text == _written_again(text, int(series[1]), first):
             file.unlink()
-            said.append(f"removed {file}, which an earlier, longer route had left")
+            messages.append(f"removed {file}, which was left by an earlier, longer route")
         else:
-            said.append(
-                f"{file} is of an earlier route, and was changed since: it stays; remove it unless you need it"
+            messages.append(
+                f"{file} belongs to an earlier route and was changed by hand, so it stays; remove it unless you "
+                "need it"
             )
         number += 1
-    return said
+    return messages
 
 
 def _written_again(text: str, part: int, first: str) -> str | None:
-    """What this program would write for the waypoints of a list; None where it cannot be one of ours."""
+    """Return what this program would write for the waypoints of a list; None if the list cannot be ours."""
     file = read_mission_file(text)
-    radius = next((one.value for one in file.arguments if one.name == "list_when_wpt_dist"), "")
+    radius = next((argument.value for argument in file.arguments if argument.name == "list_when_wpt_dist"), "")
     try:
         rows = [[from_degrees_and_minutes(part) for part in row.split()] for _, row in file.rows]
         return goto_list([Waypoint(lon, lat) for lon, lat in rows], float(radius), part, first)

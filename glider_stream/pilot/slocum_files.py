@@ -1,7 +1,7 @@
-"""Slocum mission files as pilots write them: goto lists and yo files, read, and looked through for faults.
+"""Slocum mission files of pilots: reads goto lists and yo files and finds their faults.
 
-Names, units and bounds of arguments are those of the vehicle's masterdata. A file that the vehicle cannot read it
-ignores, or flies by its defaults: each fault here stands in some public file.
+Names, units and ranges of arguments are from the vehicle's masterdata. If the vehicle cannot read a file, it
+ignores the file or flies by its defaults. Each fault here was found in a public file.
 """
 
 import math
@@ -12,18 +12,18 @@ from .route_columns import NotARoute
 from .waypoints import from_degrees_and_minutes
 
 MOST_WAYPOINTS = 8
-"""Waypoints that a goto list may hold; a vehicle can be compiled for other numbers."""
+"""A goto list may hold this many waypoints; a vehicle can be compiled with another number."""
 LEAST_DEPTH, MOST_DEPTH = 3.0, 1000.0
-"""Between these [m] a yo turns."""
+"""A yo turns between these depths [m]."""
 LEAST_RADIUS = 10.0
-"""No waypoint can be asked to be reached nearer [m]."""
+"""The smallest arrival radius of a waypoint [m]."""
 FARTHEST = 2_000e3
-"""A waypoint this far [m] from the one before has its sign, or longitude and latitude, mixed up."""
+"""A waypoint this far [m] from the one before has a wrong sign, or longitude and latitude are swapped."""
 EARTH = 6_371e3
 
 
 class Argument(NamedTuple):
-    """One `b_arg`: its line, name, unit and the text of its value."""
+    """One `b_arg`: its line, its name, its unit and the text of its value."""
 
     line: int
     name: str
@@ -32,7 +32,7 @@ class Argument(NamedTuple):
 
 
 class MissionFile(NamedTuple):
-    """A mission file: its behavior, in lower case, arguments, rows of waypoints (line, text), what it breaks."""
+    """A mission file: its behavior in lower case, arguments, rows of waypoints (line, text), and faults."""
 
     behavior: str
     arguments: list[Argument]
@@ -41,7 +41,7 @@ class MissionFile(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """What an argument may be: its unit, least and greatest value, whether whole numbers alone, which of them."""
+    """The allowed values of an argument: unit, least and greatest value, whether whole, which numbers."""
 
     unit: str
     least: float = -math.inf
@@ -98,11 +98,11 @@ YO = {
 }
 """A yo's arguments: those of its dive, `d_`, and of its climb, `c_`."""
 SERVO = ("2", "3")
-"""Values of `use_pitch` that make `pitch_value` an angle [rad]; others are inches and cc."""
+"""With these values of `use_pitch`, `pitch_value` is an angle [rad]; with others it is in inches or cc."""
 
 
 def read_mission_file(text: str) -> MissionFile:
-    """A mission file's parts; comments may stand anywhere, also before its first line."""
+    """Return the parts of a mission file; comments may stand anywhere, also before the first line."""
     faults = [
         f"line {n} has a character outside ASCII: {line.strip()!r}"
         for n, line in _lines(text)
@@ -120,13 +120,13 @@ def read_mission_file(text: str) -> MissionFile:
         if mark:
             fits = (block == "") if mark[1] == "start" else (block == mark[2])
             if not fits or (mark[1] == "start" and mark[2] in seen):
-                faults.append(f"line {n}, {line}, stands where it cannot")
+                faults.append(f"line {n}, {line}, is in a wrong place")
             block = mark[2] if mark[1] == "start" else ""
             seen.append(mark[2])
         elif block == "waypoints":
             rows.append((n, line))
-        elif block == "b_arg" and (one := re.fullmatch(r"b_arg:\s*(\w+)\(([^)]*)\)\s*(.*)", line)):
-            arguments.append(Argument(n, one[1], one[2], one[3]))
+        elif block == "b_arg" and (match := re.fullmatch(r"b_arg:\s*(\w+)\(([^)]*)\)\s*(.*)", line)):
+            arguments.append(Argument(n, match[1], match[2], match[3]))
         else:
             faults.append(f"line {n} is neither an argument nor a waypoint: {line!r}")
     if block or seen.count("b_arg") != 2:
@@ -139,7 +139,7 @@ def _lines(text: str) -> list[tuple[int, str]]:
 
 
 def goto_faults(text: str, most: int = MOST_WAYPOINTS) -> list[str]:
-    """What is wrong with a goto list, a sentence each; none where it can be flown, `most` waypoints in all."""
+    """Return the faults of a goto list, one sentence each; no fault if it can be flown with `most` waypoints."""
     file = read_mission_file(text)
     faults = [*file.faults]
     if file.behavior != "goto_list":
@@ -148,25 +148,25 @@ def goto_faults(text: str, most: int = MOST_WAYPOINTS) -> list[str]:
         return [*faults, "the waypoints must stand between <start:waypoints> and <end:waypoints>"]
     values = _values(file, GOTO_LIST, faults)
     count = len(file.rows)
-    said = values.get("num_waypoints")
-    if said is None or said != count:
-        shown = "not said" if said is None else f"{said:g}"
-        faults.append(f"num_waypoints is {shown}, and there are {count} rows")
+    number = values.get("num_waypoints")
+    if number is None or number != count:
+        shown = "not given" if number is None else f"{number:g}"
+        faults.append(f"num_waypoints is {shown}, but there are {count} rows")
     if count > most:
         faults.append(f"{count} waypoints are more than {most}")
     if values.get("num_legs_to_run") == 0:
         faults.append("num_legs_to_run must not be 0")
     first = values.get("initial_wpt", 0.0)
     if first >= max(count, 1):
-        faults.append(f"initial_wpt is {first:g}, and the last of {count} waypoints has the number {count - 1}")
-    # a list that is flown for ever, as it is where nothing is said, may begin anywhere
+        faults.append(f"initial_wpt is {first:g}, but the last of {count} waypoints has the number {count - 1}")
+    # a list that is flown for ever, which is the default, may begin anywhere
     if first == -2 and count > 1 and values.get("num_legs_to_run", -1.0) != -1:
         faults.append("initial_wpt is -2, the closest: an ordered route begins at 0")
     return faults + _row_faults(file.rows)
 
 
 def _row_faults(rows: list[tuple[int, str]]) -> list[str]:
-    """What is wrong with the rows of a goto list."""
+    """Return the faults of the rows of a goto list."""
     faults, places = [], list[tuple[float, float]]()
     for _, row in rows:
         try:
@@ -176,38 +176,38 @@ def _row_faults(rows: list[tuple[int, str]]) -> list[str]:
             faults.append(f"the row {row!r} {form}: {error}")
             continue
         if abs(lat) > 90:
-            faults.append(f"the row {row!r} has a latitude of {lat:g}; the longitude stands first")
+            faults.append(f"the row {row!r} has a latitude of {lat:g}; write the longitude first")
             continue
         if places and (far := _apart(places[-1], (lon, lat))) > FARTHEST:
             faults.append(
-                f"the row {row!r} lies {far / 1000:,.0f} km from the waypoint before it; look at its signs, and "
-                "whether the longitude stands first"
+                f"the row {row!r} lies {far / 1000:,.0f} km from the waypoint before it; check its signs, and "
+                "that the longitude is first"
             )
         places.append((lon, lat))
     return faults
 
 
 def _apart(a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Between two places in degrees [m], on a sphere."""
+    """Return the distance [m] between two places [degrees] on a sphere."""
     (lon, lat), (lon_b, lat_b) = (tuple(map(math.radians, place)) for place in (a, b))
     half = math.sin((lat_b - lat) / 2) ** 2 + math.cos(lat) * math.cos(lat_b) * math.sin((lon_b - lon) / 2) ** 2
     return 2 * EARTH * math.asin(min(1.0, math.sqrt(half)))
 
 
 def yo_faults(text: str) -> list[str]:
-    """What is wrong with a yo file, a sentence each; none where it can be flown."""
+    """Return the faults of a yo file, one sentence each; no fault if it can be flown."""
     file = read_mission_file(text)
     faults = [*file.faults]
     if file.behavior != "yo":
         faults.append("the first line must be behavior_name=yo")
     if file.rows:
-        faults.append("a yo file holds waypoints; they belong into a goto list")
+        faults.append("a yo file holds waypoints; move them into a goto list")
     values = _values(file, YO, faults)
     if values.get("num_half_cycles_to_do") == 0:
         faults.append("num_half_cycles_to_do must not be 0")
     deep, shallow = values.get("d_target_depth"), values.get("c_target_depth")
     if deep is not None and shallow is not None and not shallow < deep:
-        faults.append(f"c_target_depth is {shallow:g}, and it must lie above d_target_depth, {deep:g}")
+        faults.append(f"c_target_depth is {shallow:g}; it must be less than d_target_depth, {deep:g}")
     use = {argument.name: argument.value for argument in file.arguments if argument.name.endswith("use_pitch")}
     for half, sign, way in (("d", -1, "below 0 for a dive"), ("c", 1, "above 0 for a climb")):
         angle, name = values.get(f"{half}_pitch_value"), f"{half}_pitch_value"
@@ -215,27 +215,27 @@ def yo_faults(text: str) -> list[str]:
             continue
         if abs(angle) >= math.pi / 2:
             faults.append(
-                f"{name} is {angle:g}, and it counts in radians: {math.radians(angle):.4f} are {angle:g} degrees"
+                f"{name} is {angle:g}, but its unit is radians: {angle:g} degrees are {math.radians(angle):.4f}"
             )
         elif angle * sign <= 0:
-            faults.append(f"{name} is {angle:g}, and it must be {way}")
+            faults.append(f"{name} is {angle:g}; it must be {way}")
     return faults
 
 
 def _values(file: MissionFile, known: dict[str, Bounds], faults: list[str]) -> dict[str, float]:
-    """The arguments that are numbers, and into `faults` what is wrong with others."""
+    """Return the arguments that are numbers; add the faults of others to `faults`."""
     values: dict[str, float] = {}
     for argument in file.arguments:
         name, bounds = argument.name, known.get(argument.name)
         if bounds is None:
             what = f"{name} is not known as an argument of {file.behavior or 'this file'}"
-            faults.append(f"{what}; look at its spelling")
+            faults.append(f"{what}; check its spelling")
             continue
         if name in (earlier.name for earlier in file.arguments[: file.arguments.index(argument)]):
-            faults.append(f"{name} stands twice")
+            faults.append(f"{name} is given twice")
         unit = {"s": "sec"}.get(argument.unit.lower(), argument.unit.lower())
         if unit != bounds.unit.lower():
-            faults.append(f"{name} has the unit {argument.unit}, and its name is {name}({bounds.unit})")
+            faults.append(f"{name} has the unit {argument.unit}; write {name}({bounds.unit})")
         try:
             value = float(argument.value)
         except ValueError:
@@ -253,14 +253,14 @@ def _values(file: MissionFile, known: dict[str, Bounds], faults: list[str]) -> d
 
 
 def goto_points(text: str) -> tuple[list[tuple[float, float, float]], list[str]]:
-    """The waypoints of a goto list as lon, lat [degrees], depth 0 [m], in flown order, and what it leaves open.
+    """Return the waypoints of a goto list in flown order as lon, lat [degrees], depth 0 [m], and notes.
 
-    NotARoute where the vehicle would not fly the rows that stand there.
+    NotARoute if the vehicle would not fly these rows.
     """
     file = read_mission_file(text)
     if file.behavior != "goto_list":
         named = f"the behavior {file.behavior!r}" if file.behavior else "no behavior_name"
-        raise NotARoute(f"it has {named}, and a route is a goto_list; name the goto list")
+        raise NotARoute(f"it has {named}, but a route is a goto_list; name the goto list")
     faults: list[str] = []
     values = _values(file, GOTO_LIST, faults)
     faults += _row_faults(file.rows)

@@ -1,4 +1,4 @@
-"""Waypoints: the places where a route surfaces, and how vehicles' files write them."""
+"""Waypoints: the places where a route surfaces, and how they are written in vehicles' files."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,14 @@ from ..search.path import SURFACE, Path
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A place to fly to, longitude and latitude [degrees]."""
+    """A place to fly to: longitude and latitude [degrees]."""
 
     lon: float
     lat: float
 
 
 def waypoints(path: Path) -> list[Waypoint]:
-    """Where a geographic route surfaces, and its goal."""
+    """Return the places where a geographic route surfaces, and its goal."""
     require(path.lonlat is not None, "waypoints need longitude and latitude; plan in a geographic scenario")
     assert path.lonlat is not None
     ends = [(leg.lonlat[1], leg.end[2]) for leg in path.legs[:-1] if leg.lonlat is not None]
@@ -24,9 +24,9 @@ def waypoints(path: Path) -> list[Waypoint]:
 
 
 def degrees_and_minutes(degrees: float) -> str:
-    """DDDMM.mmmm, as vehicles read it: 74 degrees 11.587 minutes west are -7411.5870.
+    """Return degrees as DDDMM.mmmm, which vehicles read: 74 degrees 11.587 minutes west are -7411.5870.
 
-    The sign is that of the whole number; 59.99999 minutes carry.
+    The sign belongs to the whole number; 59.99999 minutes round up to the next degree.
     """
     minutes = round(abs(degrees) * 60, 4)
     packed = 100 * int(minutes // 60) + minutes % 60
@@ -34,7 +34,7 @@ def degrees_and_minutes(degrees: float) -> str:
 
 
 def from_degrees_and_minutes(text: str) -> float:
-    """Degrees of DDDMM.mmmm; ValueError where it is no such number."""
+    """Return the degrees of a text DDDMM.mmmm; ValueError if it is not such a number."""
     packed = float(text)
     whole, minutes = divmod(abs(packed), 100)
     if not minutes < 60 or whole > 180:

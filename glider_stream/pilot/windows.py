@@ -1,4 +1,4 @@
-"""Windows: where a vehicle will be in each stretch of time, as vessel traffic services ask."""
+"""Windows: the area of a vehicle in each stretch of time, which vessel traffic services ask for."""
 
 import math
 from collections.abc import Iterator
@@ -11,17 +11,18 @@ from ..search.path import Path
 from ..water.frame import wrapped
 
 HOURS = 12.0
-"""A window, unless said otherwise."""
+"""The default length of a window [h]."""
 FINEST = 1e6
-"""Parts of a degree in which the edge of a window is said."""
+"""Edges of windows are rounded to this part of a degree."""
 MOST_WINDOWS = 100_000
 
 
 @dataclass(frozen=True)
 class Window:
-    """From `start` to `end` [s since departure]: the box `west`, `south`, `east`, `north`, and depths [m].
+    """A window: the box and the depths [m] of the vehicle from `start` to `end` [s since departure].
 
-    Degrees where the route is geographic, and east is then above west even across the date line; else x, y [m].
+    `west`, `south`, `east` and `north` are in degrees if the route is geographic; then east is greater than west
+    even across the date line. Otherwise they are x, y [m].
     """
 
     start: float
@@ -35,9 +36,10 @@ class Window:
     geographic: bool = False
 
     def outline(self) -> list[tuple[float, float, float, float]]:
-        """West, south, east, north of what it covers within [-180, 180] degrees: two boxes at the date line.
+        """Return west, south, east, north within [-180, 180] degrees: two boxes at the date line, else one.
 
-        Rounded outward, by 0.1 m at most, so that no box is empty. As they are where it is not geographic.
+        They are rounded outward by at most 0.1 m, so that no box is empty. If the route is not geographic, the
+        box is unchanged.
         """
         if not self.geographic:
             return [(self.west, self.south, self.east, self.north)]
@@ -51,7 +53,7 @@ class Window:
 
 
 def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
-    """The boxes of a route, one for each stretch of so many hours; the last one ends where the route does."""
+    """Yield the windows of a route, each of `hours`; the last one ends with the route."""
     require(0 < hours < math.inf, f"a window must last more than 0 h; got {hours:g}")
     rows = path.trajectory
     if not len(rows):
@@ -59,22 +61,23 @@ def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
     at = rows[:, 1:3]
     if path.lonlat is not None:
         tracks = [leg.track for leg in path.legs if leg.track is not None]
-        require(len(tracks) == len(path.legs), "the route does not know its longitudes; query it again")
+        require(len(tracks) == len(path.legs), "the route does not hold its longitudes; query it again")
         at = np.concatenate(tracks)
         at = np.column_stack([wrapped(at[:, 0], float(at[0, 0])), at[:, 1]])
     asked = rows[-1, 0] / (3600 * hours)
     require(
-        asked <= MOST_WINDOWS, f"windows of {hours:g} h are more than {MOST_WINDOWS:,} on this route; take longer"
+        asked <= MOST_WINDOWS,
+        f"windows of {hours:g} h are more than {MOST_WINDOWS:,} on this route; choose longer windows",
     )
     count = max(1, math.ceil(asked - 1e-9))
     for n in range(count):
         start, end = 3600 * hours * n, min(3600 * hours * (n + 1), float(rows[-1, 0]))
         inside = (rows[:, 0] >= start) & (rows[:, 0] <= end)
-        # where the window begins and ends lies between two rows
+        # a window begins and ends between two rows of the trajectory
         edges = [[np.interp(t, rows[:, 0], column) for column in (*at.T, rows[:, 3])] for t in (start, end)]
         places = np.vstack([np.column_stack([at, rows[:, 3]])[inside], edges])
         low, high = places.min(axis=0), places.max(axis=0)
         (west, south, bottom), (east, north, top) = low.tolist(), high.tolist()
-        # a leg may miss the surface by the tolerance, and a vehicle does not leave the water
+        # a leg may pass the surface by the tolerance, but a vehicle does not leave the water
         top, bottom = min(top, 0.0), min(bottom, 0.0)
         yield Window(start, end, west, south, east, north, 0.0 - top, 0.0 - bottom, path.lonlat is not None)

@@ -1,4 +1,4 @@
-"""Figures: a route in its current, as the paper's figure 4 shows one; a roadmap, and steering, at a glance."""
+"""Figures: a route in its current (like figure 4 of the paper), a roadmap, and steering."""
 
 from .along import Along, along, placed
 from .canvas import check_figure, save_figure

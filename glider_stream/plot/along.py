@@ -1,4 +1,4 @@
-"""What a route says of itself on the way: speed over ground, course, and the current that it was planned in."""
+"""The steps of a route: speed over ground, course, and the current in which it was planned."""
 
 import math
 from dataclasses import replace
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from ..roadmap.problem import Problem
 
 SHORTEST = 1e-3
-"""A shorter step [s] is the remainder of an integration: its speed would be noise."""
+"""A step shorter than this [s] is the remainder of an integration; its speed would be noise."""
 
 
 class Along(NamedTuple):
-    """The steps of a route, (m,) each: `time` [s] of their middles and the `leg` that each belongs to.
+    """The steps of a route, (m,) each: `time` [s] of their middles and the `leg` of each.
 
     `speed` over ground and `through` water, both horizontal [m/s]; `course` over ground and `heading` through
     water, clockwise from true north [degrees]; the current `u` toward east and `v` toward north [m/s].
@@ -36,7 +36,7 @@ class Along(NamedTuple):
 
 
 def along(path: Path) -> Along:
-    """The steps of a path; the current is its motion over ground without its own speed, R - V cos(gamma)."""
+    """Return the steps of a path; the current is the motion over ground less the own speed, R - V cos(gamma)."""
     parts = []
     for n, leg in enumerate(path.legs):
         step = np.diff(leg.trajectory, axis=0)
@@ -57,7 +57,7 @@ def along(path: Path) -> Along:
 
 
 def placed(path: Path, problem: "Problem") -> Path:
-    """A path with the longitudes, latitudes and true north that a path file leaves out; as it is if metric."""
+    """Return a path with the longitudes, latitudes and true north that a path file leaves out, if geographic."""
     to_lonlat = problem.to_lonlat
     if to_lonlat is None:
         return path

@@ -1,7 +1,7 @@
-"""What every figure shares: look, units, files.
+"""What all figures share: style, units, files.
 
-Only matplotlib's object interface is used: no global state, no window. The layout is frozen and no clock enters a
-file, so the same input gives the same bytes.
+Only matplotlib's object interface is used: there is no global state and no window. The layout is frozen and no
+time of day enters a file, so the same input gives the same bytes.
 """
 
 import contextlib
@@ -35,15 +35,15 @@ NO_CLOCK: dict[str, dict[str, Any]] = {
 
 
 PASSING, STILL = ", as the route passes nearest", "FROZEN: all legs in the current of the departure"
-"""Of which time the currents of a figure are where the clock runs; what a figure says where it does not."""
+"""Texts of figures: PASSING gives the time of the currents if the clock runs, STILL says that it does not run."""
 
 
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
-    """The look of every figure, whatever matplotlibrc says; InputError where the extra is missing."""
+    """Apply the style of all figures in the block, independent of matplotlibrc; InputError without the extra."""
     try:
         with warnings.catch_warnings():
-            # cmocean 4.0 builds its maps in a way that matplotlib 3.11 calls deprecated
+            # matplotlib 3.11 warns about the way in which cmocean 4.0 builds its maps
             warnings.simplefilter("ignore")
             importlib.import_module("cmocean")
         style = importlib.import_module("matplotlib.style")
@@ -54,7 +54,7 @@ def styled() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float, title: str) -> "Figure":
-    """An empty figure of some inches, its title in bold on top."""
+    """Return an empty figure, `width` by `height` [inches], with a bold title on top."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -67,14 +67,14 @@ def new_figure(width: float, height: float, title: str) -> "Figure":
 
 
 def frozen(figure: "Figure") -> "Figure":
-    """The figure with its layout done: another pass, at each saving, would move the panels a little."""
+    """Return the figure with a fixed layout; otherwise each saving would move the panels a little."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     return figure
 
 
 def colours(name: str, low: float = 0.0, high: float = 1.0, white: float = 0.0) -> "ListedColormap":
-    """Part of a colour map, paled by a share of white, so that what is drawn over it shows."""
+    """Return part of a colour map, mixed with a share of white so that lines on it can be seen."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -84,38 +84,38 @@ def colours(name: str, low: float = 0.0, high: float = 1.0, white: float = 0.0) 
 
 
 def length_unit(*sides: Side) -> tuple[float, str]:
-    """Metres, or kilometres where a side is longer than 5 km."""
+    """Return the factor and name of metres, or of kilometres if a side is longer than 5 km."""
     return (1e3, "km") if max(high - low for low, high in sides) > 5e3 else (1.0, "m")
 
 
 def time_unit(seconds: float) -> tuple[float, str]:
-    """The unit that a span of time is read in."""
+    """Return the factor and name of the unit for a span of time [s]."""
     for limit, unit, name in ((300.0, 1.0, "s"), (3.0 * 3600, 60.0, "min"), (96.0 * 3600, 3600.0, "h")):
         if seconds <= limit:
             return unit, name
     return 86400.0, "days"
 
 
-def said_time(seconds: float) -> str:
-    """A span of time in words."""
+def time_text(seconds: float) -> str:
+    """Return a span of time [s] as text."""
     unit, name = time_unit(seconds)
     return f"{seconds / unit:.3g} {name}"
 
 
-def said_when(steady: bool, seconds: float, departs: datetime | None) -> str:
-    """The time of a map, of a flow that changes: the departure's date where it is known, else its seconds."""
+def when_text(steady: bool, seconds: float, departs: datetime | None) -> str:
+    """Return the time of a map as text: the departure's date if known, else its seconds; empty if steady."""
     if steady:
         return ""
-    return f", t = {said_time(seconds)}" if departs is None else f", {departs:%Y-%m-%d %H:%M} UTC"
+    return f", t = {time_text(seconds)}" if departs is None else f", {departs:%Y-%m-%d %H:%M} UTC"
 
 
 def thinned(count: int, most: int) -> NDArray[np.intp]:
-    """Numbers below `count`, evenly spread, not more than `most`: a drawing of all would hide itself."""
+    """Return at most `most` numbers below `count`, evenly spread: a drawing of all would be unreadable."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
 
 def check_figure(path: str | Path) -> str:
-    """The ending of a figure's file; InputError unless it is one that can be drawn, and the file can be made."""
+    """Return the ending of a figure's file; InputError unless it can be drawn and the file can be made."""
     suffix = Path(path).suffix.lower()
     known = ", ".join(NO_CLOCK)
     got = repr(suffix or "no ending")
@@ -125,11 +125,11 @@ def check_figure(path: str | Path) -> str:
 
 
 def save_figure(figure: "Figure", path: str | Path, dpi: float = 150) -> None:
-    """Write a figure as its file's ending says; an old file is replaced by a whole one or not at all."""
+    """Write a figure in the form of its file's ending; an old file is replaced whole or not at all."""
     suffix = check_figure(path)
     require(1 <= dpi <= 2400, f"`dpi` must be from 1 to 2400; got {dpi:g}")
     from matplotlib import rc_context
 
-    # without a salt of our own, an SVG's identifiers are random
+    # without a fixed salt, an SVG's identifiers are random
     with replacing(Path(path)) as temporary, rc_context({"svg.hashsalt": "glider-stream"}):
         figure.savefig(temporary, format=suffix[1:], dpi=dpi, metadata=NO_CLOCK[suffix])

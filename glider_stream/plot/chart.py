@@ -1,4 +1,4 @@
-"""A route as its pilot follows it: a chart with the coast and the fronts, and what happens when."""
+"""A chart of a route for its pilot: coast, fronts, and depth, heading and speeds against time."""
 
 from collections.abc import Sequence
 from datetime import timedelta
@@ -20,10 +20,10 @@ from .canvas import (
     colours,
     frozen,
     new_figure,
-    said_time,
-    said_when,
     styled,
+    time_text,
     time_unit,
+    when_text,
 )
 from .fronts import Fronts, draw_fronts
 from .scene import SEABED, draw_current, draw_ends
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
     from ..search.path import Path
 
 DEEP = 2.5
-"""A seabed that is so many times deeper than the route is not drawn: the route would be too small."""
+"""A seabed deeper than this many times the route's depth is not drawn, since the route would look too small."""
 TIME_MAP = "plasma"
 THROUGH, OVER, CURRENT = "#0072b2", INK, "#d55e00"
 
 
 class _Clock(NamedTuple):
-    """The axis that all panels share: the unit [s] and its name, the colours of times."""
+    """The time axis that all panels share: the unit [s] and its name, and the colours of times."""
 
     unit: float
     name: str
@@ -60,10 +60,10 @@ def plot_chart(
     fronts: tuple[Fronts, float] | None = None,
     title: str = "",
 ) -> "Figure":
-    """Draw a path on a chart of the current at one depth [m], the top if None, and its course against time.
+    """Draw a path on a chart of the current at one depth [m] (None: the top), and its course against time.
 
-    `fronts` and the hours between them, where they are to be drawn. Of `problem` the box `lo`, `hi` [m], the
-    `departure` [s] and `to_lonlat` are read.
+    `fronts`: the fronts and the hours between them, or None. Of `problem` the box `lo`, `hi` [m], the `departure`
+    [s] and `to_lonlat` are read.
     """
     require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
     require(depths is None or len(depths) == 1, f"a chart is drawn at one depth; got {list(depths or ())}")
@@ -76,7 +76,7 @@ def plot_chart(
         depth = frame.top if depths is None else float(checked_depths(depths, frame)[0])
         unit, name = time_unit(float(rows[-1, 0]))
         clock = _Clock(unit, name, Normalize(0.0, float(rows[-1, 0]) / unit))
-        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
+        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {time_text(path.travel_time)}"
         if path.departs is not None:
             arrives = path.departs + timedelta(seconds=path.travel_time)
             text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
@@ -89,7 +89,7 @@ def plot_chart(
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
-        when = PASSING if path.clock_runs else said_when(is_steady(flow), problem.departure, problem.departs)
+        when = PASSING if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
         every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
@@ -105,7 +105,7 @@ def plot_chart(
 
 
 def _by_time(line: Array, time: Array, clock: _Clock, width: float) -> Any:
-    """A line (n, 2), coloured by time [s]."""
+    """Return a line (n, 2) coloured by time [s]."""
     from matplotlib.collections import LineCollection
 
     look = {"cmap": colours(TIME_MAP, 0.0, 0.9), "norm": clock.norm, "linewidths": width, "capstyle": "round"}
@@ -188,7 +188,7 @@ def _draw_speeds(ax: "Axes", steps: Along, clock: _Clock) -> None:
 
 
 def _legend(ax: "Axes", lines: list[Any]) -> None:
-    """Above the panel, at its right: within, it would hide what it names."""
+    """Draw the legend above the panel at its right; inside it would hide the lines."""
     look: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.985), "frameon": False}
     look |= {"fontsize": 8, "borderaxespad": 0.1, "handlelength": 1.6, "columnspacing": 1.2}
     ax.legend(handles=lines, ncols=len(lines), **look)

@@ -1,4 +1,4 @@
-"""Comparisons: a quantity by method, with confidence intervals, against controls or time."""
+"""Comparisons: a quantity of each method, with confidence intervals, against controls or time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LOOKS = (("#0072b2", "o", "-"), ("#d55e00", "s", "--"), ("#009e73", "^", "-."), (INK, "D", ":"))
-"""Colour, marker and line of each series: told apart in grey and by the colour-blind (Okabe and Ito 2008)."""
+"""Colour, marker and line of each series: also for grey prints and colour-blind readers (Okabe and Ito 2008)."""
 
 
 class Mean(NamedTuple):
-    """A mean at `x`, None where it holds for every x, with the ends of its interval and a note."""
+    """A mean at `x` (None if it holds for every x), the ends of its interval, and a note."""
 
     x: float | None
     mean: float
@@ -25,7 +25,7 @@ class Mean(NamedTuple):
 
 @dataclass(frozen=True)
 class Series:
-    """One method's means."""
+    """The means of one method."""
 
     name: str
     points: Sequence[Mean]
@@ -34,7 +34,7 @@ class Series:
 def plot_comparison(
     series: Sequence[Series], title: str, labels: tuple[str, str], scales: tuple[str, str] = ("linear", "linear")
 ) -> "Figure":
-    """Draw means and intervals of up to four series over a common axis; `labels` with units."""
+    """Draw means and intervals of up to four series over a common axis; `labels` include units."""
     with styled():
         from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -54,7 +54,7 @@ def plot_comparison(
                 [p.x or 0.0 for p in points], [p.mean for p in points], yerr=[below, above], label=method.name,
                 color=colour, marker=marker, linestyle=line, markersize=4.5, capsize=2.5, linewidth=1.2,
             )  # fmt: skip
-            # notes of the first series above, of others below: they rarely meet
+            # notes of the first series are above, of others below, so that they rarely overlap
             up = 1 if method is series[0] else -1
             for p in points:
                 axes.annotate(

@@ -19,9 +19,9 @@ LINE = {"marker": "o", "markersize": 3.5, "linewidth": 1.4}
 
 
 def plot_departures(found: Departures, title: str = "") -> "Figure":
-    """Draw the travel time of each departure, and below it when it arrives; gaps where there is no path."""
+    """Draw the travel time and below it the arrival of each departure; there are gaps where no path exists."""
     any_path = any(path.found for path in found.paths)
-    require(any_path, "none of the departures has a path, so there is nothing to draw")
+    require(any_path, "no departure has a path, so there is nothing to draw; try other departures")
     with styled():
         leaves = np.array([leaving(path) for path in found.paths])
         travel = np.array([path.travel_time if path.found else np.nan for path in found.paths])
@@ -52,7 +52,7 @@ def plot_departures(found: Departures, title: str = "") -> "Figure":
 
 
 def _clock(path: Path) -> tuple[Callable[[Any], Any], str]:
-    """What makes seconds of the flow into what the axes show: dates (UTC), else hours; and the unit."""
+    """Return a function from seconds of the flow to values on the axes, and the unit: dates (UTC), else hours."""
     departs = path.departs
     if departs is None:
         return lambda seconds: seconds / 3600.0, "h"

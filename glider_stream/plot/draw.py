@@ -1,4 +1,4 @@
-"""What is drawn, and where: a roadmap, a route, its chart, or a page of it."""
+"""Chooses the drawing: a roadmap, a route, its chart, or a page of it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as File
@@ -26,26 +26,26 @@ if TYPE_CHECKING:
 
 
 def is_page(output: str | File | None) -> bool:
-    """Whether an output is a page to look around in."""
+    """Return whether an output is an interactive page (.html)."""
     return output is not None and File(output).suffix.lower() == PAGE
 
 
 def check_drawing(
     output: str | File | None, path: object, depths: Sequence[float] | None, chart: bool, fronts: float | None
 ) -> None:
-    """InputError where what is asked for does not go together, or cannot be written: before any work."""
+    """Raise InputError, before any work, if options do not go together or the output cannot be written."""
     as_page = is_page(output)
     if output is not None:
         check_output(output) if as_page else check_figure(output)
     needs = "a page" if as_page else "`fronts`" if fronts is not None else "a chart"
     plain = not chart and not as_page and fronts is None
-    require(path is not None or plain, f"{needs} needs a path, got none; give the file that `query -o` wrote")
+    require(path is not None or plain, f"{needs} needs a path; got none: give the file that `query -o` wrote")
     single = path is not None or depths is None or len(depths) == 1
     require(single, f"a roadmap is drawn at one depth; got {depths}")
 
 
 def check_water(problem: Problem, route: Path, name: str) -> None:
-    """InputError where a leg of a route begins or ends outside the problem's water."""
+    """Raise InputError if a leg of a route begins or ends outside the problem's water."""
     stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
     here = bool(problem.evaluator.allowed(stops, problem.departure).all())
     require(here, f"{name} leaves the roadmap's water; draw it over the roadmap that it was found in")
@@ -54,7 +54,7 @@ def check_water(problem: Problem, route: Path, name: str) -> None:
 def draw_roadmap(
     road: Roadmap, problem: Problem, output: str | File | None, depths: Sequence[float] | None, title: str
 ) -> "Figure":
-    """The roadmap at one depth."""
+    """Draw the roadmap at one depth [m]."""
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     figure = plot_roadmap(flow, terrain, problem, road, None if depths is None else depths[0], title)
     if output is not None:
@@ -73,10 +73,10 @@ def draw_route(
     arrivals: Callable[[Array], Array],
     title: str,
 ) -> "Figure | None":
-    """A route over maps of the current, by time on a chart, or as a page: then no figure is returned.
+    """Draw a route over maps of the current, by time on a chart, or as a page.
 
-    Among nodes `position` (n, 3) [m]; `arrivals` of a start (3,) [m]: when each node can be reached at the
-    soonest [s], for `fronts` [h].
+    Return the figure, or None for a page. `position` (n, 3) [m]: the nodes. `arrivals` from a start (3,) [m]: the
+    earliest time [s] at each node, for `fronts` [h].
     """
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     check_water(problem, route, "the path")
@@ -103,7 +103,7 @@ def draw_routes(
     output: str | File | None,
     depth: float | None,
 ) -> "Figure":
-    """Several routes by name, side by side."""
+    """Draw several named routes side by side."""
     for name, route in routes.items():
         check_water(problem, route, f"the path {name}")
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain

@@ -1,4 +1,4 @@
-"""Fronts: how far one gets in so many hours, as lines of equal arrival time between a roadmap's nodes."""
+"""Fronts: lines of equal arrival time between a roadmap's nodes, one for each number of hours."""
 
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST = 100
-"""More lines than this are a grey area."""
+"""At most this many lines are drawn; more would be a grey area."""
 STRETCHED = 3.0
-"""A triangle with a side so many times the median one spans water that nobody asked about."""
+"""A triangle with a side of this many times the median side is left out: it covers water without nodes."""
 HOUR = 3600.0
 FRONT = "#7a1f6b"
 
 
 class Fronts(NamedTuple):
-    """Places x, y (n,) [m], the earliest arrival there [s], at any depth, and triangles (m, 3) between them."""
+    """Places x, y (n,) [m], the earliest arrival there [s] at any depth, and triangles (m, 3) between them."""
 
     x: Array
     y: Array
@@ -33,7 +33,7 @@ class Fronts(NamedTuple):
 
 
 def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
-    """The places of nodes (n, 3) [m] that are reached, `arrival` (n,) [s], inf where one is not."""
+    """Return the places of nodes (n, 3) [m] that are reached; `arrival` (n,) [s] is inf if a node is not."""
     from scipy.spatial import Delaunay, QhullError
 
     known = np.isfinite(arrival)
@@ -45,7 +45,7 @@ def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
     if len(places) >= 3:
         try:
             triangles = Delaunay(places).simplices.astype(np.intp)
-        except QhullError:  # all on one line
+        except QhullError:  # all points are on one line
             return Fronts(x, y, time, triangles)
         corners = places[triangles]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
@@ -56,20 +56,21 @@ def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:
 
 
 def front_times(fronts: Fronts, hours: float) -> Array:
-    """The times [s] of fronts every so many hours; InputError where that is not an interval, or far too fine."""
+    """Return the times [s] of fronts, one every `hours`; InputError if `hours` is far too small."""
     require(0.0 < hours < math.inf, f"`fronts` must be a number of hours above 0; got {hours:g}")
     last = float(fronts.time.max(initial=0.0)) / HOUR
     lines = last / hours
     least = f"give {last / MOST:.2g} hours or more"
     require(
-        lines < MOST + 1, f"`fronts` every {hours:g} hours are {lines:.0f} lines until {last:.3g} hours; {least}"
+        lines < MOST + 1,
+        f"`fronts` every {hours:g} hours would be {lines:.0f} lines until {last:.3g} hours; {least}",
     )
     count = math.floor(lines)
     return np.asarray(np.arange(1, count + 1) * (hours * HOUR), np.float64)
 
 
 def draw_fronts(ax: "Axes", frame: Frame, fronts: Fronts, hours: float) -> None:
-    """The fronts on a map, labelled in hours."""
+    """Draw the fronts on a map, with labels in hours."""
     levels = front_times(fronts, hours)
     if not levels.size or not fronts.triangles.size:
         return

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 STEPS = (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
-"""Between two lines [degrees]."""
+"""The allowed distances of two lines [degrees]."""
 FINE = 120  # cells along the longer side
 
 
 def round_degrees(low: float, high: float, most: int) -> Array:
-    """Round angles [degrees] from low to high, at most some: the finest step that gives no more."""
+    """Return round angles [degrees] from low to high, with the finest step that gives at most `most`."""
     fits = [step for step in STEPS if np.floor(high / step) - np.ceil(low / step) + 1 <= most]
     step = min(fits, default=STEPS[0])
     angles: Array = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
@@ -25,14 +25,14 @@ def round_degrees(low: float, high: float, most: int) -> Array:
 
 
 def named(angle: float, letters: str) -> str:
-    """An angle [degrees] with the letter of its side, without one where it is 0 or 180."""
+    """Return an angle [degrees] as text with the letter of its side; without a letter at 0 and 180."""
     angle = (angle + 180.0) % 360.0 - 180.0
     text = f"{round(abs(angle), 4):g}°"
     return text if abs(angle) < 1e-9 or abs(angle) == 180.0 else text + letters[int(angle < 0)]
 
 
 def draw_graticule(ax: "Axes", frame: Frame) -> None:
-    """Ticks at round longitudes and latitudes, where they meet the map's lower and left side; fine lines."""
+    """Draw ticks where round longitudes and latitudes meet the map's lower and left side, and fine lines."""
     if frame.to_lonlat is None:
         return
     x, y = frame.mesh(FINE)

@@ -1,8 +1,8 @@
-"""A page: a route to look around in, one HTML file that asks nothing of any network.
+"""A page: an interactive view of a route in one HTML file, which loads nothing from a network.
 
-The files beside this one that make it: `page.html` is its body, `page.css` its look, and of its script
-`page-data.js` reads, `page-map.js` and `page-profile.js` draw, `page.js` moves. All that they draw stands in the
-page as one JSON text. The policy in `page.html` forbids the browser to load anything else.
+The files beside this one make it: `page.html` is its body, `page.css` its style; of its script, `page-data.js`
+reads, `page-map.js` and `page-profile.js` draw, and `page.js` moves. All data stand in the page as one JSON text.
+The policy in `page.html` forbids the browser to load anything else.
 """
 
 import html
@@ -22,7 +22,7 @@ from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import PASSING, STILL, length_unit, said_time, said_when, thinned, time_unit
+from .canvas import PASSING, STILL, length_unit, thinned, time_text, time_unit, when_text
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import sample_bottom
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 PAGE = ".html"
 SCRIPT = ("page-data.js", "page-map.js", "page-profile.js", "page.js")
 CURRENT_CELLS, SEABED_CELLS, LONLAT_POINTS = 56, 160, 33
-"""Along the longer side of the map; between the points of each the page reads linearly."""
+"""Numbers of points along the longer side of the map; the page interpolates linearly between them."""
 MOST_ROWS = 20_000
-"""Of the trajectory; a longer one is thinned, its ends kept."""
+"""The most rows of a trajectory; a longer one is thinned, and its ends are kept."""
 FEWEST = 4  # rows of a leg
 
 
@@ -52,10 +52,10 @@ def save_page(
     fronts: tuple[Fronts, float] | None = None,
     title: str = "",
 ) -> None:
-    """Write the page of a path that is `placed`; an old file is replaced by a whole one or not at all.
+    """Write the page of a path that is `placed`; an old file is replaced whole or not at all.
 
-    The current is shown at up to four `depths` [m], as `plot_route` chooses them among the nodes `position`
-    (n, 3) [m]; `fronts` with the hours between them. Of `problem` the box `lo`, `hi` [m], the `departure` [s]
+    The current is shown at up to four `depths` [m], which `plot_route` chooses from the nodes `position` (n, 3)
+    [m]; `fronts`: the fronts and the hours between them. Of `problem` the box `lo`, `hi` [m], the `departure` [s]
     and `to_lonlat` are read.
     """
     require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
@@ -78,19 +78,19 @@ def save_page(
 
 
 def page_text(held: dict[str, Any], title: str) -> str:
-    """The page that shows what is `held`."""
+    """Return the text of the page that shows the data `held`."""
 
     def part(name: str) -> str:
         return files(__package__ or "").joinpath(name).read_text("utf-8")
 
-    # no text may end the script, or the document's beginning, that it stands in
+    # no text may end the script or the head of the document in which it stands
     data = json.dumps(held, separators=(",", ":"), allow_nan=False)
     for mark in "<>&":
         data = data.replace(mark, f"\\u{ord(mark):04x}")
     script = "".join(map(part, SCRIPT))
     pieces, rest = [], part("page.html")
     for name, fill in (("title", html.escape(title)), ("css", part("page.css")), ("data", data), ("js", script)):
-        # what is filled in is not looked through again
+        # texts that are filled in are not searched again
         piece, rest = rest.split(f"{{{{{name}}}}}")
         pieces += [piece, fill]
     return "".join([*pieces, rest])
@@ -98,11 +98,11 @@ def page_text(held: dict[str, Any], title: str) -> str:
 
 def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str, Any]:
     unit, name = time_unit(path.travel_time)
-    when = PASSING if path.clock_runs else said_when(is_steady(flow), problem.departure, problem.departs)
+    when = PASSING if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
     legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
     return {
         "title": title or "Route",
-        "said": f"{legs}, {said_time(path.travel_time)}" + (f"; {STILL}" if path.frozen else ""),
+        "said": f"{legs}, {time_text(path.travel_time)}" + (f"; {STILL}" if path.frozen else ""),
         "when": when,
         "time": {"size": unit, "name": name, "total": path.travel_time},
         "departs": None if path.departs is None else path.departs.timestamp() * 1e3,
@@ -110,7 +110,7 @@ def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str
 
 
 def _numbers(values: Array, digits: int) -> list[Any]:
-    """Rounded numbers, None for those that are not finite: short, and JSON."""
+    """Return rounded numbers for JSON, with None for those that are not finite."""
     rounded = np.round(values, digits) + 0.0
     if digits <= 0:
         return [int(value) if math.isfinite(value) else None for value in rounded.ravel().tolist()]
@@ -126,7 +126,7 @@ def _lonlat(frame: Frame) -> dict[str, Any] | None:
 
 
 def _current(flow: Flow, frame: Frame, depths: Array, t: Time) -> dict[str, Any]:
-    """The current in mm/s at cell centres, row by row from the south, for each depth."""
+    """Return the current [mm/s] at cell centres for each depth, row by row from the south."""
     x, y = frame.mesh(CURRENT_CELLS)
     times = t(x, y) if callable(t) else t
     fields = [sample_field(flow, x, y, -depth, times) for depth in depths]
@@ -141,7 +141,7 @@ def _current(flow: Flow, frame: Frame, depths: Array, t: Time) -> dict[str, Any]
 
 
 def _seabed(terrain: Terrain, frame: Frame) -> dict[str, Any] | None:
-    """Depth of the seabed at cell centres [m], 0 on land, None where it is not known; None if nowhere."""
+    """Return the depth of the seabed [m] at cell centres: 0 on land, None where unknown."""
     x, y = frame.mesh(SEABED_CELLS)
     depth = -sample_bottom(terrain, x, y)
     if not np.isfinite(depth).any():
@@ -181,7 +181,7 @@ def _legs(terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
 
 
 def _means(path: "Path") -> Array:
-    """Mean speed over ground and current u, v [m/s] of each leg, (legs, 3), NaN where one has no step."""
+    """Return mean speed over ground and current u, v [m/s] of each leg, (legs, 3); NaN without steps."""
     steps, count = along(path), len(path.legs)
     sums = [np.bincount(steps.leg, weights=some, minlength=count) for some in (steps.speed, steps.u, steps.v)]
     with np.errstate(invalid="ignore"):
@@ -189,7 +189,7 @@ def _means(path: "Path") -> Array:
 
 
 def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:
-    front_times(fronts, hours)  # refuses what cannot be drawn
+    front_times(fronts, hours)  # raises InputError if it cannot be drawn
     return {
         "hours": hours,
         "last": float(fronts.time.max(initial=0.0)) / HOUR,

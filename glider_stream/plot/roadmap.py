@@ -1,4 +1,4 @@
-"""A roadmap at a glance: its edges over the current, where one can go, how long it takes, how one steers."""
+"""A figure of a roadmap: its edges over the current, ways out of nodes, travel times, controls."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
-from .canvas import INK, colours, frozen, new_figure, said_time, said_when, styled, thinned, time_unit
+from .canvas import INK, colours, frozen, new_figure, styled, thinned, time_text, time_unit, when_text
 from .scene import MAX_NODES, draw_current, draw_space
 from .water import Frame, checked_depths, frame_of
 
@@ -29,10 +29,10 @@ def plot_roadmap(
     depth: float | None = None,
     title: str = "",
 ) -> "Figure":
-    """Draw a roadmap: map at a `depth` [m], the top if None; ways out of each node, edge times, steering, counts.
+    """Draw a roadmap: its map at a `depth` [m] (None: the top), degrees of nodes, edge times, controls, counts.
 
-    Of `problem`, the box `lo`, `hi` [m], the `departure` [s], which is the time of the map, and `to_lonlat`
-    are read.
+    Of `problem` the box `lo`, `hi` [m], the `departure` [s], which is the time of the map, and `to_lonlat` are
+    read.
     """
     with styled():
         frame = frame_of(problem, roadmap.position)
@@ -43,7 +43,7 @@ def plot_roadmap(
         ax = left.add_subplot()
         image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.5, arrows=24)
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
-        when = said_when(is_steady(flow), problem.departure, problem.departs)
+        when = when_text(is_steady(flow), problem.departure, problem.departs)
         _draw_edges(ax, frame, roadmap, f"over the current at {depth:.4g} m{when}")
         _draw_degree(right.add_subplot(2, 2, 1, projection="3d"), terrain, frame, roadmap)
         _draw_facts(right.add_subplot(2, 2, 2), roadmap)
@@ -58,7 +58,7 @@ def _draw_edges(ax: Any, frame: Frame, roadmap: "Roadmap", over: str) -> None:
 
     edges = roadmap.target.size
     drawn = thinned(edges, MAX_EDGES)
-    # quick edges are short: drawn last, they stay in sight
+    # quick edges are short: drawn last, they remain visible
     drawn = drawn[np.argsort(-roadmap.time[drawn], kind="stable")]
     source = np.repeat(np.arange(len(roadmap.position)), np.diff(roadmap.indptr))
     places = frame.scaled(roadmap.position)[:, :2]
@@ -70,7 +70,7 @@ def _draw_edges(ax: Any, frame: Frame, roadmap: "Roadmap", over: str) -> None:
         linewidths=0.7,
         alpha=0.75,
         zorder=4,
-        # a few slow edges would leave all others one colour
+        # a few slow edges would give all others the same colour
         norm=Normalize(0.0, max(float(np.quantile(times, 0.95)), 1e-9) if edges else 1.0),
     )
     lines.set_array(times[drawn])
@@ -104,8 +104,8 @@ def _draw_facts(ax: Any, roadmap: "Roadmap") -> None:
     facts += [("Nodes without a way in", f"{(into == 0).sum():,}")]
     if edges:
         facts += [("Dives", f"{np.mean(roadmap.glide_angle < 0):.0%}")]
-        facts += [("Median edge time", said_time(float(np.median(roadmap.time))))]
-        facts += [("Longest edge time", said_time(float(roadmap.time.max())))]
+        facts += [("Median edge time", time_text(float(np.median(roadmap.time))))]
+        facts += [("Longest edge time", time_text(float(roadmap.time.max())))]
     ax.set(xlim=(0, 1), ylim=(len(facts) + 0.2, -0.4))
     ax.axis("off")
     ax.set_title("Counts")

@@ -1,4 +1,4 @@
-"""A route three ways, as the paper's figure 4: in space, over the current, as depth against time."""
+"""A figure of a route like figure 4 of the paper: in space, over the current, and as depth against time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -19,10 +19,10 @@ from .canvas import (
     colours,
     frozen,
     new_figure,
-    said_time,
-    said_when,
     styled,
+    time_text,
     time_unit,
+    when_text,
 )
 from .scene import draw_current, draw_ends, draw_space, stretch
 from .water import Frame, checked_depths, frame_of, passing, sample_field
@@ -40,7 +40,7 @@ LONGEST_ARROW = 0.4  # inches, in the profile
 
 
 def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) -> Array:
-    """The depths [m] of the maps: those asked for, else the nodes' own if few, else evenly spread ones."""
+    """Return the depths [m] of the maps: the given ones, else those of the nodes if few, else even ones."""
     if depths is not None:
         require(1 <= len(depths) <= MAX_MAPS, f"`depths` must name 1 to {MAX_MAPS} depths; got {len(depths)}")
         return np.unique(checked_depths(depths, frame))
@@ -49,7 +49,7 @@ def map_depths(position: Array, frame: Frame, depths: Sequence[float] | None) ->
 
 
 def map_columns(count: int, frame: Frame) -> tuple[int, float]:
-    """In how many columns `count` maps of a frame are drawn largest, and the share of the width they fill."""
+    """Return the number of columns in which `count` maps are largest, and the share of the width they fill."""
     width, height = frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]
     across, up = MAPS_ROOM
 
@@ -71,8 +71,8 @@ def plot_route(
 ) -> "Figure":
     """Draw a path among the nodes `position` (n, 3) [m], over the current at up to four `depths` [m].
 
-    Of `problem`, the box `lo`, `hi` [m], the `departure` [s] and `to_lonlat` are read. Where the clock runs the
-    maps show each place as the route passes nearest to it, else as at departure.
+    Of `problem` the box `lo`, `hi` [m], the `departure` [s] and `to_lonlat` are read. If the clock runs, the maps
+    show each place at the time when the route passes nearest to it, else at the departure.
     """
     require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
     with styled():
@@ -82,9 +82,9 @@ def plot_route(
         stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)], np.float64)
         frame = frame_of(problem, np.vstack([rows[:, 1:], stops]))
         norm = Normalize(frame.top, frame.bottom)
-        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {said_time(path.travel_time)}"
-        # a date beside each depth would cover the next map's title
-        when = said_when(is_steady(flow), problem.departure, problem.departs)
+        text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {time_text(path.travel_time)}"
+        # a date beside each depth would cover the title of the next map
+        when = when_text(is_steady(flow), problem.departure, problem.departs)
         dated = when if problem.departs is not None else ""
         if path.clock_runs:
             when = dated = PASSING
@@ -113,7 +113,7 @@ def plot_route(
 
 
 def _route(line: Array, depth: Array, norm: Any, width: float) -> Any:
-    """A line (n, 2) or (n, 3), coloured by depth."""
+    """Return a line (n, 2) or (n, 3), coloured by depth."""
     from matplotlib.collections import LineCollection
     from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-untyped]
 
@@ -144,7 +144,7 @@ def _draw_track(ax: "Axes", frame: Frame, rows: Array, stops: Array, depth: floa
     line = frame.scaled(rows[:, 1:])
     ax.plot(*line[:, :2].T, color="white", linewidth=2.9, solid_capstyle="round", zorder=4)
     ax.add_collection(_route(line[:, :2], line[:, 2], norm, 1.3))
-    # a sixth: with four maps evenly spread, each part of the route is bold in just one
+    # a sixth: with four evenly spread maps, each part of the route is bold in just one of them
     far = np.abs(line[:, 2] - depth) > (frame.bottom - frame.top) / 6.0
     near = np.where(far[:, None], np.nan, line[:, :2])
     ax.plot(*near.T, color="white", linewidth=5.4, solid_capstyle="round", zorder=6)
@@ -164,7 +164,7 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
     unit, name = time_unit(float(rows[-1, 0] - rows[0, 0]))
     time, depth = rows[:, 0] / unit, -rows[:, 3] + 0.0
     span = max(float(np.ptp(depth)), 1.0)
-    # above the leg numbers, below the arrows of the deepest point
+    # room above for the leg numbers and below for the arrows of the deepest point
     ax.set(xlim=(time[0], time[-1]), ylim=(depth.max() + 0.32 * span, depth.min() - 0.4 * span))
     ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
     ax.plot(time, depth, color="white", linewidth=4.0, zorder=4)

@@ -1,4 +1,4 @@
-"""Several routes of one problem side by side: on a map, in space and as depth against time, with their times."""
+"""A figure of several routes of one problem: on a map, in space, and as depth against time, with their times."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from ..base.settings import require
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
-from .canvas import INK, frozen, new_figure, said_time, styled, time_unit
+from .canvas import INK, frozen, new_figure, styled, time_text, time_unit
 from .scene import draw_current, draw_ends, draw_space, stretch
 from .water import checked_depths, frame_of
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..search.path import Path
 
 LOOKS = (("#d55e00", (0, (4.0, 1.2))), ("#0072b2", "-"), ("#009e73", (0, (6, 1, 1, 1))), (INK, ":"))
-"""Colour and line of each route: they differ in print, and for people who see few colours (Okabe, Ito 2008)."""
+"""Colour and line of each route: they differ in print and for people who see few colours (Okabe, Ito 2008)."""
 
 
 def plot_routes(
@@ -32,10 +32,10 @@ def plot_routes(
     paths: Mapping[str, "Path"],
     depth: float | None = None,
 ) -> "Figure":
-    """Draw two to four paths by name among the nodes `position` (n, 3) [m], over the current at a `depth` [m].
+    """Draw two to four named paths among the nodes `position` (n, 3) [m], over the current at a `depth` [m].
 
-    The middle of the box is the depth where none is given. Of `problem`, the box `lo`, `hi` [m], the
-    `departure` [s], which is the time of the map, and `to_lonlat` are read.
+    Without a depth it is the middle of the box. Of `problem` the box `lo`, `hi` [m], the `departure` [s], which
+    is the time of the map, and `to_lonlat` are read.
     """
     fits = 2 <= len(paths) <= len(LOOKS)
     require(fits, f"a comparison shows 2 to {len(LOOKS)} routes; got {len(paths)}")
@@ -52,7 +52,7 @@ def plot_routes(
         space.set_title(f"(a) In space, {stretch(frame)}", loc="left")
         chart = figure.add_subplot(grid[0, 1])
         image = draw_current(chart, flow, terrain, frame, level, problem.departure, pale=0.45)
-        when = "" if is_steady(flow) else f", t = {said_time(problem.departure)}"
+        when = "" if is_steady(flow) else f", t = {time_text(problem.departure)}"
         chart.set_title(f"(b) From above, over the current at {level:.4g} m{when}")
         chart.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
         figure.colorbar(image, ax=chart, label="Current speed (m/s)", aspect=35, pad=0.02)
@@ -82,18 +82,18 @@ def plot_routes(
 
 
 def _stops(path: "Path") -> Array:
-    """The ends of all legs (n + 1, 3) [m]."""
+    """Return the ends of all legs (n + 1, 3) [m]."""
     return np.array([path.legs[0].start, *(leg.end for leg in path.legs)], np.float64)
 
 
 def _seconds(time: float) -> str:
-    """A travel time in seconds, and in a longer unit where seconds are many."""
+    """Return a travel time as text in seconds, and also in a longer unit if it is long."""
     _, name = time_unit(time)
-    return f"{time:,.0f} s" if name == "s" else f"{time:,.0f} s ({said_time(time)})"
+    return f"{time:,.0f} s" if name == "s" else f"{time:,.0f} s ({time_text(time)})"
 
 
 def _draw_profile(ax: Any, paths: Mapping[str, "Path"], rows: Mapping[str, Array]) -> None:
-    """Depth against time, and the time at which each route ends."""
+    """Draw depth against time, and the time at which each route ends."""
     last = max(path.travel_time for path in paths.values())
     unit, unit_name = time_unit(last)
     deepest = max(float(-row[:, 3].min()) for row in rows.values())

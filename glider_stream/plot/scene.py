@@ -1,4 +1,4 @@
-"""What figures are made of: the current and the land on a map, the ends of a route, the box in space."""
+"""The parts of figures: current and land on a map, the ends of a route, the box in space."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,10 @@ COASTLINE = 1.2  # points
 
 
 def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:
-    """Land in dark grey, what is too shallow at a depth [m] in light grey, the coast; whether there is any."""
+    """Draw land in dark grey, water too shallow at a depth [m] in light grey, and the coast.
+
+    Return whether there is any land.
+    """
     from matplotlib.colors import ListedColormap
 
     x, y = frame.mesh(PIXELS)
@@ -35,7 +38,7 @@ def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:
     ax.imshow(dry, cmap=grey, vmin=0, vmax=2, origin="lower", extent=(ends[0], ends[1], ends[2], ends[3]))
     if not dry.any():
         return False
-    # in print, dark water and land are the same grey: only an outline tells them apart
+    # in print, dark water and land have the same grey: only an outline separates them
     for outlined, width in ((dry > 0, 0.5), (land, COASTLINE)):
         if outlined.any() and not outlined.all():
             ax.contour(
@@ -54,11 +57,10 @@ def draw_current(
     pale: float = 0.15,
     arrows: int = 15,
 ) -> Any:
-    """The current at a depth [m] and time t [s], one or that of each place; returns the image.
+    """Draw the current at a depth [m] and a time t [s] (one, or one for each place); return the image.
 
-    Speed as colour, direction as arrows.
-
-    `pale` is the share of white in the colours, `arrows` their number along the longer side.
+    Colours are speeds, arrows are directions. `pale` is the share of white in the colours, `arrows` the number of
+    arrows along the longer side.
     """
 
     def current(count: int) -> tuple[Array, Array, Array, Array]:
@@ -75,7 +77,7 @@ def draw_current(
     image = ax.imshow(np.hypot(u, v), cmap=colour, vmin=0.0, origin="lower", extent=extent)
     x, y, u, v = current(arrows)
     speed = np.hypot(u, v)
-    # lengths by the square root: slow water stays readable next to fast
+    # lengths grow with the square root, so that slow water remains readable beside fast water
     length = 1.0 / np.sqrt(np.maximum(speed * np.nanmax(speed, initial=1e-12), 1e-12))
     look: dict[str, Any] = {
         "scale_units": "width",
@@ -91,7 +93,7 @@ def draw_current(
 
 
 def draw_ends(ax: Any, points: Array, size: float = 1.0) -> None:
-    """Start and goal, told apart by shape: print loses colours."""
+    """Draw start and goal; their shapes differ, because print loses colours."""
     for row, marker, area, label in ((0, "o", 70, "start"), (-1, "*", 190, "goal")):
         place = [points[row, k : k + 1] for k in range(points.shape[1])]
         look = {"edgecolors": INK, "facecolors": "white", "linewidths": 1.4, "zorder": 9, "clip_on": False}
@@ -99,7 +101,7 @@ def draw_ends(ax: Any, points: Array, size: float = 1.0) -> None:
 
 
 def draw_space(ax: Any, terrain: Terrain, frame: Frame, nodes: Array, ticks: int = 5, **look: Any) -> Any:
-    """Dress a 3-D panel, depth downward, with its nodes (n, 3) [m]; returns their marks."""
+    """Prepare a 3-D panel, depth downward, with its nodes (n, 3) [m]; return their marks."""
     sides = np.array([frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]])
     ax.computed_zorder = False
     ax.set_proj_type("ortho")
@@ -123,7 +125,7 @@ def draw_space(ax: Any, terrain: Terrain, frame: Frame, nodes: Array, ticks: int
 
 
 def stretch(frame: Frame) -> str:
-    """How many times depth is stretched in `draw_space`, in words."""
+    """Return as text how many times depth is stretched in `draw_space`."""
     times = HEIGHT * max(frame.x[1] - frame.x[0], frame.y[1] - frame.y[0]) / (frame.bottom - frame.top)
     text = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
     return f"depth stretched {text} times" if times > 1.05 else "depth to scale"

@@ -1,4 +1,4 @@
-"""Steering at a glance: a node's flow map, its folds, a target's several solutions; what each method finds."""
+"""A figure of steering: a node's flow map, its folds, the solutions of a target; what each method finds."""
 
 import math
 from dataclasses import replace
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from ..roadmap.problem import Problem
 
 MESH = (97, 193)
-"""Controls of a figure's fan, glide angle by heading."""
+"""Controls of a figure's fan: glide angles by headings."""
 LINES = (9, 33)
-"""Those of them that are drawn as lines."""
+"""The number of them that are drawn as lines."""
 CANDIDATES = 16
 SOURCES = 40
-"""Nodes whose pairs the methods are compared on."""
+"""The methods are compared on the pairs of this many nodes."""
 LANDED = 0.01
-"""A solution lands this close [m]."""
+"""A solution lands this close to its target [m]."""
 
 
 class Fan(NamedTuple):
@@ -47,7 +47,7 @@ class Fan(NamedTuple):
 
 
 def fan_of(evaluator: Evaluator, start: Array, height: float, departure: float) -> Fan:
-    """The fan of a point (3,) [m] at a height [m]: the glide angles that get there in time, all headings."""
+    """Return the fan of a point (3,) [m] at a height [m]: all headings, and glide angles that arrive in time."""
     polar = evaluator.polar
     direction = CLIMB if height > start[2] else DIVE
     angle = np.linspace(polar.shallowest[direction], polar.steepest[direction], 20 * MESH[0])
@@ -62,7 +62,7 @@ def fan_of(evaluator: Evaluator, start: Array, height: float, departure: float) 
 
 
 def solutions(evaluator: Evaluator, fan: Fan, goal: Array, departure: float) -> Array:
-    """All controls of a fan's mesh that lead to a goal (3,) [m]: angle, heading (n, 2) [rad]."""
+    """Return all controls of a fan's mesh that lead to a goal (3,) [m]: angle, heading (n, 2) [rad]."""
     miss = np.hypot(fan.x - goal[0], fan.y - goal[1])
     lowest = miss == minimum_filter(miss, size=3, mode=("nearest", "wrap"))
 
@@ -81,7 +81,7 @@ def solutions(evaluator: Evaluator, fan: Fan, goal: Array, departure: float) -> 
 
 
 def folded(fan: Fan) -> NDArray[np.bool_]:
-    """Where the fan's map turns over: the sign of its Jacobian is not that of most controls, (n, m)."""
+    """Return where the fan's map is folded over: where its Jacobian has the rarer sign, (n, m)."""
     x_a, x_h = np.gradient(fan.x, fan.angle, fan.heading)
     y_a, y_h = np.gradient(fan.y, fan.angle, fan.heading)
     sign = x_a * y_h - x_h * y_a > 0.0
@@ -89,7 +89,7 @@ def folded(fan: Fan) -> NDArray[np.bool_]:
 
 
 def plot_steering(problem: "Problem", position: Array, start: Array, goal: Array, title: str = "") -> "Figure":
-    """Draw how legs are found: a fan from `start`, its mesh at the depth of `goal` (3,) [m], what methods find.
+    """Draw how legs are found: a fan from `start`, its mesh at the depth of `goal` (3,) [m], results of methods.
 
     `position` (n, 3) [m] are the roadmap's nodes.
     """

@@ -1,4 +1,4 @@
-"""The water of a figure: its box, and what the kernels say of current and land in it."""
+"""The water of a figure: its box, and the kernels' current and land in it."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -32,7 +32,7 @@ def _sample_water(terrain, x, y, z, wet):  # type: ignore[no-untyped-def]
 
 
 def sample_field(flow: Flow, x: ArrayLike, y: ArrayLike, z: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
-    """The current u, v [m/s] at points x, y, z [m] and times t [s], broadcast; NaN where it is not known."""
+    """Return the current u, v [m/s] at points x, y, z [m] and times t [s], broadcast; NaN where unknown."""
     points = np.broadcast_arrays(*(np.asarray(a, np.float64) for a in (x, y, z, t)))
     u, v = np.full(points[0].size, np.nan), np.full(points[0].size, np.nan)
     _sample_field(flow, *(p.flatten() for p in points), u, v)
@@ -40,7 +40,7 @@ def sample_field(flow: Flow, x: ArrayLike, y: ArrayLike, z: ArrayLike, t: ArrayL
 
 
 def sample_water(terrain: Terrain, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> NDArray[np.bool_]:
-    """Whether a glider may be at points x, y, z [m], broadcast."""
+    """Return whether a glider may be at points x, y, z [m], broadcast."""
     points = np.broadcast_arrays(*(np.asarray(a, np.float64) for a in (x, y, z)))
     wet = np.zeros(points[0].size, np.bool_)
     _sample_water(terrain, *(p.flatten() for p in points), wet)
@@ -48,13 +48,13 @@ def sample_water(terrain: Terrain, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> 
 
 
 Time = float | Callable[[Array, Array], Array]
-"""The time [s] of a map's current: one, or that of each place x, y [m]."""
+"""The time [s] of a map's current: one number, or a function of the place x, y [m]."""
 
 
 def passing(path: "Path", departure: float) -> Time:
-    """When a map of a route is read: where the clock runs, each place as the route passes nearest to it.
+    """Return the time of a route's map: at each place, when the route passes nearest to it.
 
-    At the `departure` [s] where it does not, or the flow is steady.
+    It is the `departure` [s] if the clock does not run or the flow is steady.
     """
     if not path.clock_runs:
         return departure
@@ -71,9 +71,9 @@ def passing(path: "Path", departure: float) -> Time:
 
 
 class Frame(NamedTuple):
-    """The box of a figure: sides x, y [m], depths `top` and `bottom` [m] downward, the unit of length.
+    """The box of a figure: sides x, y [m], depths `top` and `bottom` [m, downward], the unit of length.
 
-    `labels` of a map's axes: in degrees where the scenario is geographic, and `to_lonlat` makes them.
+    The `labels` of a map's axes are in degrees if the scenario is geographic; `to_lonlat` computes them.
     """
 
     x: Side
@@ -86,7 +86,7 @@ class Frame(NamedTuple):
     to_lonlat: Callable[[Array], Array] | None = None
 
     def mesh(self, count: int) -> tuple[Array, Array]:
-        """Cell centres, `count` along the longer side, in square cells."""
+        """Return the centres of square cells, `count` along the longer side."""
         longer = max(side[1] - side[0] for side in (self.x, self.y))
         sides = []
         for low, high in (self.x, self.y):
@@ -96,16 +96,16 @@ class Frame(NamedTuple):
         return x, y
 
     def scaled(self, points: Array) -> Array:
-        """Points (n, 3), x, y, z [m], as they are drawn: in the unit of length, depth [m] downward."""
+        """Return points (n, 3), x, y, z [m], as they are drawn: in the unit of length, depth [m] downward."""
         drawn: Array = np.asarray(points, np.float64) / [self.unit, self.unit, -1.0] + 0.0
         return drawn
 
 
 def frame_of(problem: "Problem", points: Array) -> Frame:
-    """The frame that holds a problem's box and the points (n, 3) [m]."""
+    """Return the frame that holds a problem's box and the points (n, 3) [m]."""
     low, high = np.minimum(problem.lo, points.min(axis=0)), np.maximum(problem.hi, points.max(axis=0))
     x, y = (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
-    # a path that surfaces ends a rounding above it
+    # a path that surfaces may end above it by a rounding error
     top, bottom = max(0.0, float(-high[2])), float(-low[2])
     unit, name = length_unit(x, y)
     labels = (f"East ({name})", f"North ({name})")
@@ -115,7 +115,7 @@ def frame_of(problem: "Problem", points: Array) -> Frame:
 
 
 def checked_depths(depths: Sequence[float], frame: Frame) -> Array:
-    """Depths [m] of maps; InputError where the scenario knows no current: above the surface, below its box."""
+    """Return the depths [m] of maps; InputError above the surface or below the box, where no current is known."""
     for depth in depths:
         fits = 0.0 <= depth <= frame.bottom
         require(fits, f"`depth` must be from 0 m to {frame.bottom:g} m, the domain's deepest; got {depth:g}")

@@ -1,1 +1,1 @@
-"""The vehicle: models of its glide, their polars and presets, what a leg costs, calibration."""
+"""The vehicle: models of its glide, polars, presets, the cost of a leg, calibration."""

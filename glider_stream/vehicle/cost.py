@@ -1,4 +1,4 @@
-"""What legs cost: travel time, or energy."""
+"""The cost of legs: travel time or energy."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -16,26 +16,26 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class TravelTime:
-    """A leg costs the time that it takes [s], and an inflection nothing."""
+    """A leg costs its travel time [s]; an inflection costs nothing."""
 
     unit: ClassVar[str] = "s"
 
-    def kernel(self) -> cost.Cost:
-        """The cost of a second and of a leg, for the kernels: the fastest control is the cheapest."""
-        return cost.Cost(1.0, 0.0)
+    def kernel(self) -> cost.CostRates:
+        """Return the cost of a second and of a leg, for the kernels; the fastest control is the cheapest."""
+        return cost.CostRates(1.0, 0.0)
 
     def inflection(self, z: ArrayLike) -> Array | None:
-        """What a turn from dive to climb costs at heights z [m]; None where turns are free."""
+        """Return the cost of a turn from dive to climb at heights z [m]; None if turns are free."""
         return None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Energy:
-    """A leg costs what the vehicle uses [J]: E = P T + E_trim, and rho g |z| dV / eta(z) where it inflates.
+    """A leg costs the energy that the vehicle uses [J]: E = P T + E_trim, and E_pump at an inflection.
 
-    `hotel` P [W]; `trim` E_trim [J] of a leg's change of trim; `volume` dV [cc] pumped against the pressure
-    of the depth |z| where a dive turns into a climb; `efficiency` eta of the pump, pairs of depth [m] and
-    share, straight between them and held beyond; `density` rho [kg/m^3].
+    `hotel` P [W]. `trim` E_trim [J]: the change of trim at each leg. E_pump = rho g |z| dV / eta(z): `volume` dV
+    [cc] is pumped against the pressure at the depth |z| where a dive turns into a climb; `efficiency` eta: pairs
+    of depth [m] and share, linear between them and constant beyond; `density` rho [kg/m^3].
     """
 
     unit: ClassVar[str] = "J"
@@ -58,12 +58,12 @@ class Energy:
         within = min(share) > 0 and max(share) <= 1
         require(within, f"the shares of `cost.efficiency` must be above 0, at most 1; got {list(share)}")
 
-    def kernel(self) -> cost.Cost:
-        """The rate [W] and the fixed cost [J] of a leg, for the kernels; a cost rises with time."""
-        return cost.Cost(float(self.hotel), float(self.trim))
+    def kernel(self) -> cost.CostRates:
+        """Return the rate [W] and the fixed cost [J] of a leg, for the kernels; a cost rises with time."""
+        return cost.CostRates(float(self.hotel), float(self.trim))
 
     def inflection(self, z: ArrayLike) -> Array | None:
-        """What the pump uses [J] where a dive turns into a climb at heights z [m]: rho g |z| dV / eta(z)."""
+        """Return the pump's energy [J] where a dive becomes a climb at heights z [m]: rho g |z| dV / eta(z)."""
         depth = np.abs(np.asarray(z, np.float64))
         known, shares = (np.array(column) for column in zip(*self.efficiency, strict=True))
         share = np.interp(depth, known, shares)
@@ -85,7 +85,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 def energy_from_table(table: dict[str, Any]) -> dict[str, Any]:
-    """The keys of a [cost] table of kind "energy"; the values of its `preset` replace missing keys."""
+    """Return the keys of a [cost] table of kind "energy"; its `preset` gives the missing values."""
     given = dict(table)
     name = given.pop("preset", None)
     if name is None:

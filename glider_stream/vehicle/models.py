@@ -1,8 +1,8 @@
-"""Gliders: drag models from the scenario's [glider] table, and the polar that the kernels fly by.
+"""Gliders: drag models for the scenario's [glider] table.
 
-Signs: the glide angle gamma < 0 dives, > 0 climbs; the net mass is > 0 heavy, < 0 light; the angle of attack
-is > 0 in a dive, < 0 in a climb, so that pitch = gamma + alpha is shallower than the path. A new model is one
-dataclass and one row of MODELS.
+Signs: the glide angle gamma < 0 dives, > 0 climbs; the net mass is > 0 if heavy, < 0 if light; the angle of
+attack is > 0 in a dive and < 0 in a climb, so that pitch = gamma + alpha is shallower than the path. A new model
+is one dataclass and one row of MODELS.
 """
 
 import math
@@ -16,13 +16,13 @@ from ..base.settings import require
 from ..kernels.control import CLIMB, DIVE
 from .polar import polar
 
-SOLVE_TOLERANCE = 1e-13  # of ln q
-SOLVE_STEPS = 100  # 4 to 7 do for a usable range, 20 within 1e-12 rad of the limit
+SOLVE_TOLERANCE = 1e-13  # relative, of q
+SOLVE_STEPS = 100  # 4 to 7 steps are enough in a usable range, 20 within 1e-12 rad of the limit
 
 
 @dataclass(frozen=True, kw_only=True)
 class Glider:
-    """What the models share: `angles` [degrees], the range of |gamma|, and `gravity` [m/s^2]."""
+    """The base of all models: `angles` [degrees], the range of |gamma|, and `gravity` [m/s^2]."""
 
     angles: tuple[float, float]
     gravity: float
@@ -55,36 +55,39 @@ class Glider:
             require(value > 0.0, f"`glider.{name}` must be greater than 0; got {value}")
 
     def speed(self, gamma: Array | float) -> Array:
-        """Speed through water V [m/s] at the signed glide angle [rad]; NaN where no steady glide exists."""
+        """Return the speed through water V [m/s] at the signed glide angle [rad]; NaN without a steady glide."""
         return self._glide(self._feasible(gamma))[0]
 
     def angle_of_attack(self, gamma: Array | float) -> Array:
-        """Angle of attack alpha [rad] at the signed glide angle [rad]; NaN where no steady glide exists."""
+        """Return the angle of attack alpha [rad] at the signed glide angle [rad]; NaN without a steady glide."""
         return self._glide(self._feasible(gamma))[1]
 
     def net_mass(self, gamma: Array | float) -> Array:
-        """Net mass m0 [kg] of the phase: > 0 in a dive, < 0 in a climb."""
+        """Return the net mass m0 [kg] of the phase: > 0 in a dive, < 0 in a climb."""
         return np.where(np.asarray(gamma) < 0.0, *self._net_masses())
 
     @cached_property
     def limits(self) -> tuple[float, float]:
-        """`feasible_limits`, found once: a fit asks for them some thousand times."""
+        """The `feasible_limits`, computed once, since a fit needs them some thousand times."""
         return self.feasible_limits()
 
     def feasible_limits(self) -> tuple[float, float]:
-        """Limits [rad]: gamma below the first dives, above the second climbs; no glide exists between them."""
+        """Return two limits [rad] of gamma: dives lie below the first and climbs above the second.
+
+        No steady glide exists between them.
+        """
         raise NotImplementedError
 
     def _net_masses(self) -> tuple[float, float]:
-        """Net mass [kg] in a dive and in a climb."""
+        """Return the net mass [kg] in a dive and in a climb."""
         raise NotImplementedError
 
     def _glide(self, gamma: Array) -> tuple[Array, Array]:
-        """V [m/s] and alpha [rad] at feasible angles."""
+        """Return V [m/s] and alpha [rad] at feasible angles."""
         raise NotImplementedError
 
     def _feasible(self, gamma: Array | float) -> Array:
-        """The angles [rad], NaN for those that no steady glide has."""
+        """Return the angles [rad], with NaN where no steady glide exists."""
         gamma = np.asarray(gamma, dtype=np.float64)
         dive, climb = self.limits
         glides = ((gamma < dive) | (gamma > climb)) & (np.abs(gamma) <= 0.5 * math.pi)
@@ -95,11 +98,11 @@ class Glider:
 class SteadyGlide(Glider):
     """Leonard and Graver's steady glide (2001), the model of the source paper (arXiv 2005.03834).
 
-    The forces are D V^2 and L V^2 with D = K_D0 + K_D alpha^2, L = K_L0 + K_L alpha, alpha in radians:
-    `drag_0` K_D0, `lift_0` K_L0 [kg/m]; `drag_alpha2` K_D [kg/(m rad^2)]; `lift_alpha` K_L [kg/(m rad)].
+    The forces are D V^2 and L V^2 with D = K_D0 + K_D alpha^2, L = K_L0 + K_L alpha, alpha in radians: `drag_0`
+    K_D0, `lift_0` K_L0 [kg/m]; `drag_alpha2` K_D [kg/(m rad^2)]; `lift_alpha` K_L [kg/(m rad)].
 
-    The ballast is full in a dive and empty in a climb: m0 = `ballast_max` - `offset` and m0 = -`offset`
-    [kg], where `offset` = m - m_h - m_bar is the displaced mass less all that is not ballast.
+    The ballast is full in a dive and empty in a climb: m0 = `ballast_max` - `offset` and m0 = -`offset` [kg].
+    `offset` = m - m_h - m_bar is the displaced mass less all mass that is not ballast.
     """
 
     drag_0: float
@@ -112,12 +115,19 @@ class SteadyGlide(Glider):
     def __post_init__(self) -> None:
         self._positive("gravity", "drag_0", "drag_alpha2", "lift_alpha")
         masses = f"`glider.offset` = {self.offset} kg, `glider.ballast_max` = {self.ballast_max} kg"
-        require(self.offset > 0.0, f"the climb has no speed: empty, the glider is not light ({masses})")
-        require(self.offset < self.ballast_max, f"the dive has no speed: full, it is not heavy ({masses})")
+        require(
+            self.offset > 0.0,
+            f"the climb has no speed: with empty ballast the glider is not light ({masses}); give a larger "
+            "offset",
+        )
+        require(
+            self.offset < self.ballast_max,
+            f"the dive has no speed: with full ballast the glider is not heavy ({masses}); give more ballast",
+        )
         super().__post_init__()
 
     def feasible_limits(self) -> tuple[float, float]:
-        """lim± = atan(2 (K_D/K_L) (K_L0/K_L ± sqrt((K_L0/K_L)^2 + K_D0/K_D))) [rad]."""
+        """Return lim± = atan(2 (K_D/K_L) (K_L0/K_L ± sqrt((K_L0/K_L)^2 + K_D0/K_D))) [rad]."""
         lift = self.lift_0 / self.lift_alpha
         root = math.sqrt(lift**2 + self.drag_0 / self.drag_alpha2)
         scale = 2.0 * self.drag_alpha2 / self.lift_alpha
@@ -127,10 +137,10 @@ class SteadyGlide(Glider):
         return self.ballast_max - self.offset, -self.offset
 
     def _glide(self, gamma: Array) -> tuple[Array, Array]:
-        """V = sqrt(-m0 g sin(gamma) / D), alpha the smaller root of tan(gamma) = -D/L.
+        """Return V = sqrt(-m0 g sin(gamma) / D) and alpha, the smaller root of tan(gamma) = -D/L.
 
-        The paper's forms cancel: V = sqrt(m0 g / (L cos - D sin)); alpha = (1/2) (K_L/K_D) tan(gamma)
-        (-1 + sqrt(1 - x)) with x = 4 (K_D/K_L^2) cot(gamma) F, F = K_D0 cot(gamma) + K_L0.
+        The paper's forms lose digits by cancellation. Here V = sqrt(m0 g / (L cos - D sin)) and alpha = (1/2)
+        (K_L/K_D) tan(gamma) (-1 + sqrt(1 - x)) with x = 4 (K_D/K_L^2) cot(gamma) F, F = K_D0 cot(gamma) + K_L0.
         """
         cot = np.cos(gamma) / np.sin(gamma)
         force = self.drag_0 * cot + self.lift_0
@@ -146,8 +156,8 @@ class Seaglider(Glider):
 
     Lift = l^2 q a alpha, drag = l^2 q (b q^s + c alpha^2) [N], q = rho0 V^2 / 2 [Pa], alpha in **degrees**:
     `lift` a [1/degree], `drag` b [Pa^-s], `drag_exponent` s, `induced_drag` c [1/degree^2], `length` l [m],
-    `density` rho0 [kg/m^3]; `dive_volume` and `climb_volume` [cc] are the volumes short of and beyond
-    neutral buoyancy.
+    `density` rho0 [kg/m^3]. `dive_volume` and `climb_volume` [cc] are the volumes below and above neutral
+    buoyancy.
     """
 
     lift: float
@@ -174,17 +184,20 @@ class Seaglider(Glider):
         return 1e-6 * self.density * self.dive_volume, -1e-6 * self.density * self.climb_volume
 
     def _forces(self, gamma: Array) -> tuple[Array, Array]:
-        """Drag and lift [N] that balance the weight W: -W sin(gamma), and W cos(gamma)."""
+        """Return drag and lift [N] that balance the weight W: -W sin(gamma) and W cos(gamma)."""
         weight = self.net_mass(gamma) * self.gravity
         return -weight * np.sin(gamma), weight * np.cos(gamma)
 
     def _terms(self, lift: Array) -> tuple[float, Array]:
-        """B and C of drag = B q^(1+s) + C / q: alpha = lift / (l^2 a q) put into the drag."""
+        """Return B and C of drag = B q^(1+s) + C / q, with alpha = lift / (l^2 a q) inserted."""
         area = self.length**2
         return area * self.drag, self.induced_drag * (lift / self.lift) ** 2 / area
 
     def feasible_limits(self) -> tuple[float, float]:
-        """Where the drag equals its least value, (2 + s) B q^(1+s) at q^(2+s) = C / (B (1 + s)) [rad]."""
+        """Return the limits [rad]: angles where the drag is (2 + s) B q^(1+s) at q^(2+s) = C / (B (1 + s)).
+
+        There the drag equals its minimum.
+        """
         power = 1.0 + self.drag_exponent
         angles = np.array([[0.0, 0.0], [0.5 * math.pi, 0.5 * math.pi]])
         for _ in range(60):
@@ -196,11 +209,14 @@ class Seaglider(Glider):
         return -float(angles[1, DIVE]), float(angles[1, CLIMB])
 
     def _glide(self, gamma: Array) -> tuple[Array, Array]:
-        """V = sqrt(2 q / rho0), alpha = lift / (l^2 a q), q the larger root of B q^(1+s) + C / q = drag."""
+        """Return V = sqrt(2 q / rho0) and alpha = lift / (l^2 a q).
+
+        q is the larger root of B q^(1+s) + C / q = drag.
+        """
         drag, lift = self._forces(gamma)
         base, induced = self._terms(lift)
         power = 1.0 + self.drag_exponent
-        # convex in x = ln q, and begun beyond the larger root: Newton's steps cannot pass it
+        # the function is convex in x = ln q; Newton's steps from beyond the larger root cannot pass it
         x = np.log(drag / base) / power
         for _ in range(SOLVE_STEPS):
             parasite, vortex = base * np.exp(power * x), induced * np.exp(-x)

@@ -1,4 +1,4 @@
-"""The glide polar: a model's speeds as a table for the kernels."""
+"""The glide polar: the speeds of a model as a table for the kernels."""
 
 import hashlib
 import math
@@ -12,7 +12,7 @@ from ..base.settings import require
 from ..kernels.control import Polar
 
 POLAR_TOLERANCE = 1e-7
-"""The relative error of a speed that is read from the table, which is linear between its angles."""
+"""The relative error of a speed from the table, which is linear between its angles."""
 
 POLAR_STEPS = (256, 65536)
 """The fewest and the most steps that a table may have."""
@@ -22,28 +22,28 @@ ROUNDING = 8 * np.finfo(np.float64).eps
 
 
 class SteadyModel(Protocol):
-    """What a polar is made of: a model of steady glides, as in `models`."""
+    """The model of steady glides that a polar is made from; see `models`."""
 
     @property
     def angles(self) -> tuple[float, float]:
-        """The range of |gamma| [degrees]."""
+        """Return the range of |gamma| [degrees]."""
         ...
 
     def speed(self, gamma: Array | float) -> Array:
-        """Speed through water [m/s] at signed glide angles [rad]."""
+        """Return the speed through water [m/s] at signed glide angles [rad]."""
         ...
 
     def feasible_limits(self) -> tuple[float, float]:
-        """The shallowest steady dive (< 0) and climb (> 0) [rad]."""
+        """Return the shallowest steady dive (< 0) and climb (> 0) [rad]."""
         ...
 
 
 def polar(model: SteadyModel) -> Polar:
-    """The kernels' table of V [m/s] over |gamma|, with as many steps as POLAR_TOLERANCE needs."""
+    """Return the kernels' table of V [m/s] over |gamma|, with as many steps as POLAR_TOLERANCE needs."""
     low, high = np.radians(model.angles)
     steps, most = POLAR_STEPS
     while True:
-        # twice as fine as the table: every other angle is a middle, where a chord errs most
+        # twice as fine as the table: every second angle is the middle of a step, where the error is greatest
         angle = np.linspace(low, high, 2 * steps + 1)
         speed = np.stack([model.speed(-angle), model.speed(angle)])
         chord = 0.5 * (speed[:, :-2:2] + speed[:, 2::2])
@@ -62,9 +62,10 @@ def polar(model: SteadyModel) -> Polar:
 
 
 def _fastest(angle: Array, speed: Array) -> tuple[float, float]:
-    """Angle [rad] and value [m/s] of the greatest V cos(angle), V linear between the rows of a table.
+    """Return the angle [rad] and the value [m/s] of the greatest V cos(angle).
 
-    InputError unless V cos rises to it and falls after it, and V sin rises throughout: the kernels bisect.
+    V is linear between the rows of the table. InputError unless V cos rises up to this angle and falls after it,
+    and V sin rises throughout: the kernels use bisection.
     """
     slope = np.diff(speed) / np.diff(angle)
     ends, values = np.stack([angle[:-1], angle[1:]]), np.stack([speed[:-1], speed[1:]])
@@ -77,17 +78,17 @@ def _fastest(angle: Array, speed: Array) -> tuple[float, float]:
     require(bool(np.all(rising[:count])), f"the horizontal speed must have one maximum {where}")
     step = count // 2
     best = float(angle[step])
-    if count % 2:  # inside the step, where the derivative is all but linear: Newton
+    if count % 2:  # Newton's method, since the derivative is nearly linear within the step
         for _ in range(5):
             along = speed[step] + slope[step] * (best - angle[step])
             sine, cosine = math.sin(best), math.cos(best)
             best += float((slope[step] * cosine - along * sine) / (2.0 * slope[step] * sine + along * cosine))
-    # rounded up: no control may be faster than the lowest-speed test believes
+    # rounded up: no control may be faster than the lowest-speed test assumes
     return best, float(np.interp(best, angle, speed) * math.cos(best) * (1.0 + ROUNDING))
 
 
 def glider_sha256(polar: Polar) -> str:
-    """Digest of the polar's numbers, for the roadmap file: the same glider, the same digest."""
+    """Return a digest of the polar's numbers for the roadmap file: the same glider has the same digest."""
     digest = hashlib.sha256()
     for array in polar:
         digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())

@@ -1,4 +1,4 @@
-"""Gliders by name, and the [glider] section of a scenario."""
+"""Gliders by name, and the [glider] table of a scenario."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -13,7 +13,7 @@ SYMBOLS = {
     **{"off": "offset", "m_b_max": "ballast_max", "g": "gravity"},
     **{"a": "lift", "b": "drag", "c": "induced_drag", "s": "drag_exponent", "rho0": "density", "l": "length"},
 }
-"""The papers' symbols, which may stand for the keys."""
+"""The papers' symbols, which a scenario may use instead of the keys."""
 
 PRESETS: dict[str, Glider] = {
     "paper": SteadyGlide(
@@ -60,11 +60,13 @@ PRESETS: dict[str, Glider] = {
 
 
 def glider_from_table(table: Mapping[str, Any]) -> Glider:
-    """The glider of a scenario's [glider] table: `preset` and overrides, or `model` and all its keys."""
+    """Return the glider of a scenario's [glider] table: `preset` and changes, or `model` and all its keys."""
     named: dict[str, Any] = {}
     for key, value in table.items():
         name = SYMBOLS.get(key, key)
-        require(name not in named, f"`glider.{name}` is given twice, by its name and by its symbol")
+        require(
+            name not in named, f"`glider.{name}` is given twice, by its name and by its symbol; leave one out"
+        )
         named[name] = value
     if "preset" not in named:
         missing = f"`glider.preset` is missing: choose from: {', '.join(PRESETS)}; or give `glider.model`"

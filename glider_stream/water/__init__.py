@@ -1,1 +1,1 @@
-"""The water: frames and domains, currents in closed form and out of ocean files, terrain."""
+"""The water: the local frame, the domain, currents (formulas and ocean files) and the terrain."""

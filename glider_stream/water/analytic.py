@@ -1,4 +1,4 @@
-"""Flows of a scenario: analytic fields, checked and turned into what the kernels read."""
+"""Analytic flows of a scenario: checks their values and makes the flows that the kernels read."""
 
 import itertools
 import math
@@ -14,14 +14,15 @@ from ..kernels import flow as kernel
 
 ALWAYS = (-math.inf, math.inf)
 BEYOND = 50.0
-"""How far [m] a path may pass the depths of the domain: the bound of the speed holds there too."""
+"""A path may leave the domain's depths by this distance [m]; the bound of the speed holds there too."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AnalyticFlow:
-    """What every analytic flow may say: the box `x`, `y` [m] in which it is known, and `sampled`.
+    """Settings that every analytic flow has: the box `x`, `y` [m] in which the flow is known, and `sampled`.
 
-    `sampled` = [dx, dy, dz] [m] reads the flow once on a grid, trilinear between its points.
+    If `sampled` = [dx, dy, dz] [m] is given, the flow is evaluated once on a grid with at most these spacings and
+    interpolated trilinearly.
     """
 
     x: Range | None = None
@@ -37,14 +38,17 @@ class AnalyticFlow:
         self.check()
 
     def check(self) -> None:
-        """Check the flow's own values."""
+        """Raise InputError if a value of this flow is not usable."""
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """The kernel's class, its fields, and what of its extent is not as usual; `depth` [m] of interest."""
+        """Return the kernel's class and its fields; `depth` [m, downward] is the range that the plan uses.
+
+        The fields of `Extent` may be left out where the flow has no bounds of its own.
+        """
         raise NotImplementedError
 
     def kernel(self, z: Range) -> kernel.Flow:
-        """The flow as the kernels read it; `z` [m] is the range of heights of interest."""
+        """Return the flow as the kernels read it; `z` [m, upward] is the range of heights that the plan uses."""
         kind, values = self.fields((-z[1], -z[0]))
         (x_lo, x_hi), (y_lo, y_hi) = self.x or ALWAYS, self.y or ALWAYS
         usual = {"x_lo": x_lo, "x_hi": x_hi, "y_lo": y_lo, "y_hi": y_hi, "t_lo": -math.inf, "t_hi": math.inf}
@@ -62,7 +66,7 @@ class Uniform(AnalyticFlow):
     v: float
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """As AnalyticFlow says."""
+        """Return the kernel's class and its fields."""
         speed = math.hypot(self.u, self.v)
         return kernel.Uniform, {"u": self.u, "v": self.v, "max_speed": speed, "length_scale": math.inf}
 
@@ -86,21 +90,21 @@ class Vortex:
 
 @dataclass(frozen=True)
 class Vortices(AnalyticFlow):
-    """A sum of vortices; one without `thickness` is the same at all depths."""
+    """A sum of vortices; a vortex without `thickness` is the same at all depths."""
 
     vortex: tuple[Vortex, ...]
 
     def check(self) -> None:
-        """At least one vortex."""
+        """Raise InputError if there is no vortex."""
         require(len(self.vortex) > 0, "`flow.vortex` must hold at least one vortex; got none")
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """As AnalyticFlow says."""
+        """Return the kernel's class and its fields."""
         columns = {
-            name: np.array([getattr(one, name) for one in self.vortex])
+            name: np.array([getattr(vortex, name) for vortex in self.vortex])
             for name in ("x", "y", "radius", "speed", "depth")
         }
-        columns["thickness"] = np.array([one.thickness or math.inf for one in self.vortex])
+        columns["thickness"] = np.array([vortex.thickness or math.inf for vortex in self.vortex])
         bound = _speed_bound(columns, depth)
         return kernel.Vortices, columns | {
             "max_speed": bound,
@@ -109,16 +113,19 @@ class Vortices(AnalyticFlow):
 
 
 def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices: int = 8) -> float:
-    """An upper bound of the summed speed [m/s]: per cell, the sum of each vortex's own maximum in it."""
+    """Return an upper bound of the total speed [m/s].
+
+    The domain is divided into cells. The bound of a cell is the sum of the maxima of all vortices in it.
+    """
     radius, speed = vortex["radius"], np.abs(vortex["speed"])
 
     def rim(r: Array) -> Array:
         return np.asarray(speed[:, None, None] * r * np.exp(0.5 - 0.5 * r * r))
 
-    # a path may end a tolerance and a step beyond the depths of its nodes
+    # a path may end deeper or shallower than its nodes, by a tolerance and a step
     depth = (depth[0] - BEYOND, depth[1] + BEYOND)
     edges = [np.linspace((vortex[a] - 3 * radius).min(), (vortex[a] + 3 * radius).max(), cells + 1) for a in "xy"]
-    # distances from each centre, in radii: nearest and farthest point of each cell
+    # the nearest and the farthest point of each cell: their distances from each centre, in radii
     spans = []
     for axis, line in zip("xy", edges, strict=True):
         low = (line[:-1] - vortex[axis][:, None]) / radius[:, None]
@@ -129,7 +136,7 @@ def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices
     near = np.hypot(spans[0][0][:, :, None], spans[1][0][:, None, :])
     far = np.hypot(spans[0][1][:, :, None], spans[1][1][:, None, :])
     inside = np.where((near <= 1) & (far >= 1), speed[:, None, None], np.maximum(rim(near), rim(far)))
-    # outside the box every centre is at least three radii away
+    # outside the box the distance to every centre is at least three radii
     outside = float(rim(np.full((radius.size, 1, 1), 3.0)).sum())
     worst = 0.0
     for top, bottom in itertools.pairwise(np.linspace(depth[0], depth[1], slices + 1)):
@@ -150,18 +157,23 @@ class DoubleGyre(AnalyticFlow):
     amplitude: float
     length: float
     epsilon: float
-    period: float = field(metadata={"missing": "the period [s] of the gyres' swing; any above 0 if steady"})
+    period: float = field(
+        metadata={"missing": "the period [s] with which the gyres swing; any value above 0 if epsilon is 0"}
+    )
     origin: tuple[float, float] = (0.0, 0.0)
     cells = 2
 
     def check(self) -> None:
-        """Positive length and period; 0 <= epsilon < 1/2, so that f maps the box onto itself."""
+        """Raise InputError unless length, period and epsilon are usable.
+
+        Length and period are positive; 0 <= epsilon < 1/2, so that f maps the box onto itself.
+        """
         require_positive(self.length, "flow.length")
         require_positive(self.period, "flow.period")
         require(0 <= self.epsilon < 0.5, f"`flow.epsilon` must be in [0, 0.5); got {self.epsilon:g}")
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """As AnalyticFlow says; the gyres' walls are streamlines, and the flow ends there."""
+        """Return the kernel's class and its fields; the flow ends at the gyres' walls, which are streamlines."""
         x, y = self.origin
         box_x, box_y = self.x or (x, x + self.cells * self.length), self.y or (y, y + self.length)
         stretch = 1 + 2 * self.epsilon * max(abs((b - x) / self.length - 1) for b in box_x)
@@ -200,11 +212,11 @@ class Rankine(AnalyticFlow):
     speed: float
 
     def check(self) -> None:
-        """Positive radius."""
+        """Raise InputError unless the radius is positive."""
         require_positive(self.radius, "flow.radius")
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """As AnalyticFlow says."""
+        """Return the kernel's class and its fields."""
         return kernel.Rankine, {
             "x": self.x_centre,
             "y": self.y_centre,
@@ -217,18 +229,21 @@ class Rankine(AnalyticFlow):
 
 @dataclass(frozen=True)
 class Jet(AnalyticFlow):
-    """A uniform jet along x: `speed` [m/s] within `width` [m] about `y_centre`, still water beside it."""
+    """A uniform jet along x: `speed` [m/s] in a band of `width` [m] about `y_centre`.
+
+    The water beside the band is still.
+    """
 
     y_centre: float
     width: float
     speed: float
 
     def check(self) -> None:
-        """Positive width."""
+        """Raise InputError unless the width is positive."""
         require_positive(self.width, "flow.width")
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
-        """As AnalyticFlow says."""
+        """Return the kernel's class and its fields."""
         return kernel.Jet, {
             "y": self.y_centre,
             "width": self.width,

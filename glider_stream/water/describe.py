@@ -1,4 +1,4 @@
-"""What a current file holds and what the planner takes for what, before anyone trusts a route."""
+"""A summary of a current file: what it holds and how the planner reads it. Read it before you trust a route."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,16 +16,19 @@ from .ocean.grid import OutsideError
 Place = tuple[float, float, float | None, str | None]
 
 DEPTHS = (0.0, 50.0, 200.0, 500.0, 1000.0, 2000.0)
-"""Depths [m] whose nearest levels are spoken of."""
+"""The summary shows the levels that are nearest to these depths [m]."""
 LOOK = 2e8
-"""A file that would take more memory [bytes] is read about the places that are asked for alone."""
+"""A file that would take more memory than this [bytes] is read only around the points that the user gives."""
 NEARLY_FREE = 0.35
-"""Up to this ratio of divergence to vorticity a field is mesoscale; coastal ones begin near 0.45."""
+"""Fields with a ratio of divergence to vorticity up to this value are mesoscale; coastal ones begin near 0.45."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One depth [m]: greatest and rms speed [m/s], None where it is dry; divergence over vorticity."""
+    """The current at one depth [m]: maximum and rms speed [m/s] and the ratio of divergence to vorticity.
+
+    A value is None if the level holds no water.
+    """
 
     depth: float
     max_speed: float | None
@@ -35,7 +38,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Point:
-    """A place and time, and the current there [m/s]; None where there is no water or no data."""
+    """A place, a time and the current there [m/s], None where the file has no water or no data."""
 
     lon: float
     lat: float
@@ -47,7 +50,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Description:
-    """A file's currents in a few numbers; `str` says them to people, `as_dict` to programs."""
+    """The currents of a file in a few numbers; `str` gives text for people, `as_dict` a dictionary for JSON."""
 
     file: OceanFile
     levels: tuple[Level, ...]
@@ -58,7 +61,7 @@ class Description:
 
     @property
     def spacing(self) -> tuple[float, float, float, float]:
-        """Median spacing in longitude and latitude [degrees], then along rows and across them [km]."""
+        """Median spacing in longitude and latitude [degrees], then along and across the rows [km]."""
         lon, lat = self.file.grid.mesh()
         steps = np.diff(lon % 360, axis=1), np.diff(lat, axis=0)
         east, north = (float(np.median(np.abs(step))) for step in steps)
@@ -67,16 +70,16 @@ class Description:
 
     @property
     def shape_of_grid(self) -> str:
-        """Whether its rows follow parallels."""
+        """ "regular" if the rows follow parallels, else "curved"."""
         return "regular" if isinstance(self.file.grid, LonLatGrid) else "curved"
 
     @property
     def land(self) -> float:
-        """Share of columns that are dry at the top level."""
+        """Share of the columns that have no water at the top level."""
         return float(1 - self.file.wet[0].mean())
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the description as a dictionary for JSON."""
         file, spacing = self.file, self.spacing
         return {
             "file": file.name,
@@ -119,7 +122,7 @@ class Description:
         )
         lines[-1] += f", {east:.3g} x {north:.3g} km"
         lines.append(f"  times       {file.time_range}" + (f", {nt} of them" if nt > 1 else ""))
-        levels = "not said" if file.surface else f"{file.depth[0]:.4g} to {file.depth[-1]:.6g} m, {nz} levels"
+        levels = "not given" if file.surface else f"{file.depth[0]:.4g} to {file.depth[-1]:.6g} m, {nz} levels"
         lines.append(f"  depths      {levels}")
         for level in self.levels:
             speeds = "no water"
@@ -147,14 +150,14 @@ class Description:
             return f"{ratio:.2f} of vorticity: small, the stream value hardly depends on the path"
         return (
             f"{ratio:.2f} of vorticity: large, the stream value depends on the path; "
-            "controls from it miss more often, those from the flow map do not"
+            "controls found with it miss more often; the flow map is not affected"
         )
 
     def _frame(self) -> str:
         if self.frame_error > MAX_SCALE_ERROR:
-            return "the whole extent is too wide for one flat frame: plan in a part of it"
-        told = f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
-        return told if self.map_error is None else f"{told}, by {self.map_error:.2g} m in place"
+            return "the whole extent is too wide for one flat frame: plan in a smaller area"
+        text = f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
+        return text if self.map_error is None else f"{text}, by {self.map_error:.2g} m in place"
 
 
 def _ratio(ratio: float | None) -> str:
@@ -179,9 +182,9 @@ def describe(
     at: Sequence[Place] = (),
     names: Names | Mapping[str, Any] | None = None,
 ) -> Description:
-    """What the current files hold, and the current at some places: (lon, lat, depth [m], time or None).
+    """Return what the current files hold, and the current at some places (lon, lat, depth [m], time or None).
 
-    The values are those that a planner reads. A file with several times needs the time of each place.
+    The values are those that a planner reads. If a file has several times, each place needs a time.
     """
     file, points = _looked_at(files, at, names)
     near = dict.fromkeys(
@@ -189,7 +192,7 @@ def describe(
     )
     lon, lat = file.grid.bounds
     frame = LocalFrame.over(lon, lat)
-    # half around the globe the stereographic scale has long left every bound
+    # an extent of half the globe is too wide for any stereographic frame
     frame_error = 1.0 if lon[1] - lon[0] >= 180 else min(1.0, frame.scale_error(lon, lat))
     return Description(
         file=file,
@@ -204,7 +207,7 @@ def describe(
 def _looked_at(
     files: str | Path | Sequence[str | Path], at: Sequence[Place], names: Names | Mapping[str, Any] | None
 ) -> tuple[OceanFile, tuple[Point, ...]]:
-    """The file, and the current at some places; of a large file only what lies about these is read."""
+    """Return the file and the current at some places; of a large file only the parts around them are read."""
     if not at:
         return read_currents(files, names), ()
     try:
@@ -219,14 +222,14 @@ def _looked_at(
         first = first or part
     if first is None:
         return read_currents(files, names), tuple(points)
-    note = f"{size}: looked at about the places alone; what is said here is of the part about the first of them"
+    note = f"{size}: only the parts around the given places were read; this summary is of the first part"
     return replace(first, notes=(*first.notes, note)), tuple(points)
 
 
 def _about(
     files: str | Path | Sequence[str | Path], names: Names | Mapping[str, Any] | None, place: Place
 ) -> OceanFile | None:
-    """The columns about a place; None where the file does not go there."""
+    """Return the columns around a place, or None if the file does not cover it."""
     try:
         return read_currents(files, names, lon=(place[0], place[0]), lat=(place[1], place[1]))
     except OutsideError:

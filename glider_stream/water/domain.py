@@ -1,4 +1,4 @@
-"""Domains: the box that nodes are placed in, in metres or in degrees."""
+"""Domains: the box in which nodes are placed, in metres or in degrees."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ Point = tuple[float, float, float]
 
 
 ROUNDED = 1e-9
-"""By how much a place [degrees] is off after the frame's metres and back."""
+"""Rounding error [degrees] of a place that was converted to the frame's metres and back."""
 
 
 def _within(value: float, bounds: Range) -> bool:
@@ -27,7 +27,7 @@ def _within(value: float, bounds: Range) -> bool:
 
 @dataclass(frozen=True)
 class BoxDomain:
-    """x, y, z [lo, hi] in metres; z upward, the surface at 0."""
+    """A domain in metres: x, y and z are [lo, hi]; z points upward and the surface is at z = 0."""
 
     x: Range
     y: Range
@@ -36,10 +36,10 @@ class BoxDomain:
     def __post_init__(self) -> None:
         for name in ("x", "y", "z"):
             check_range(getattr(self, name), f"domain.{name}")
-        require(self.z[1] <= 0, f"`domain.z` must end at or below the surface, 0; got {self.z[1]:g}")
+        require(self.z[1] <= 0, f"`domain.z` must end at 0 (the surface) or below; got {self.z[1]:g}")
 
     def frame(self) -> None:
-        """There is no geography in it."""
+        """None: a domain in metres has no longitude and latitude."""
         return
 
     def box(self) -> tuple[Array, Array]:
@@ -48,11 +48,14 @@ class BoxDomain:
         return np.array(low), np.array(high)
 
     def point(self, values: Point) -> Array:
-        """A point of this domain's coordinates, x, y, z, in the local frame (3,) [m]."""
+        """Return the point x, y, z of this domain in the local frame, (3,) [m]."""
         return np.array(values)
 
     def outside(self, x: float, y: float) -> str:
-        """That a place x, y [m] lies outside, and whether it would inside with both swapped; empty if inside."""
+        """Return a message if the place x, y [m] lies outside the domain, else an empty text.
+
+        The message says whether the place would lie inside with x and y swapped.
+        """
         if _within(x, self.x) and _within(y, self.y):
             return ""
         bounds = f"x from {self.x[0]:g} to {self.x[1]:g} m and y from {self.y[0]:g} to {self.y[1]:g} m"
@@ -67,10 +70,10 @@ class BoxDomain:
 
 @dataclass(frozen=True)
 class GeographicDomain:
-    """lon, lat [lo, hi] in degrees, depth [lo, hi] in metres, downward.
+    """A domain in degrees: lon and lat are [lo, hi] in degrees, depth is [lo, hi] in metres, downward.
 
-    The nodes' box is the largest upright rectangle of the local frame that lies within these bounds; its
-    points are given as lon, lat, depth.
+    The nodes lie in the largest upright rectangle of the local frame that fits within these bounds. Points are
+    given as lon, lat, depth.
     """
 
     lon: Range
@@ -81,7 +84,7 @@ class GeographicDomain:
         for name in ("lat", "depth"):
             check_range(getattr(self, name), f"domain.{name}")
         top = self.depth[0]
-        require(top >= 0, f"`domain.depth` must begin at or below the surface, 0; got {top:g}")
+        require(top >= 0, f"`domain.depth` must begin at 0 (the surface) or deeper; got {top:g}")
         poleward = max(abs(bound) for bound in self.lat)
         require(poleward <= 85, f"`domain.lat` must stay within 85 degrees of the equator; got {poleward:g}")
         width = self.width
@@ -89,7 +92,7 @@ class GeographicDomain:
 
     @property
     def width(self) -> float:
-        """Degrees of longitude from west to east; a domain may cross the date line."""
+        """Width of the domain [degrees of longitude], from west to east; a domain may cross the date line."""
         span = self.lon[1] - self.lon[0]
         return span + 360 if span < -180 else span
 
@@ -109,24 +112,27 @@ class GeographicDomain:
         return np.array(low), np.array([east.min(), north.min(), 0.0 - self.depth[0]])
 
     def point(self, values: Point) -> Array:
-        """A point of this domain's coordinates, lon, lat, depth, in the local frame (3,) [m]."""
+        """Return the point lon, lat, depth of this domain in the local frame, (3,) [m]."""
         lon, lat, depth = values
         on_earth = abs(lat) < 90 and abs(lon) <= 360
         swapped = abs(lon) < 90 and abs(lat) <= 360 and self._holds(lat, lon)
         hint = "; with longitude and latitude swapped it would lie inside the domain" if swapped else ""
         cure = f"give LON,LAT,DEPTH{hint}"
-        require(on_earth, f"{lon:g}, {lat:g} is no longitude and latitude in degrees; {cure}")
+        require(on_earth, f"{lon:g}, {lat:g} are not a longitude and a latitude in degrees; {cure}")
         require(0 <= depth < math.inf, f"the depth must be at least 0 m, downward; got {depth:g}")
         x, y = self.frame().to_local(np.array([lon]), np.array([lat]))
         return np.array([x[0], y[0], 0.0 - depth])
 
     def _holds(self, lon: float, lat: float) -> bool:
-        """Whether a place in degrees lies in it."""
+        """Whether the place [degrees] lies in the domain."""
         east = (lon - self.lon[0] + ROUNDED) % 360
         return east <= self.width + 2 * ROUNDED and self.lat[0] - ROUNDED <= lat <= self.lat[1] + ROUNDED
 
     def outside(self, lon: float, lat: float) -> str:
-        """That a place in degrees lies outside, and whether it would not, were they swapped; empty if inside."""
+        """Return a message if the place [degrees] lies outside the domain, else an empty text.
+
+        The message says whether the place would lie inside with longitude and latitude swapped.
+        """
         if self._holds(lon, lat):
             return ""
         (west, east), (south, north) = self.lon, self.lat
@@ -138,7 +144,7 @@ class GeographicDomain:
 
 
 def domain_from_table(table: Mapping[str, Any]) -> BoxDomain | GeographicDomain:
-    """The domain of a scenario: geographic where it speaks of lon, lat or depth."""
+    """Return the domain of a scenario; it is geographic if the table has lon, lat or depth."""
     geographic = bool({"lon", "lat", "depth"} & set(table))
     kind: type[BoxDomain | GeographicDomain] = GeographicDomain if geographic else BoxDomain
     return from_table(kind, table, "domain")

@@ -1,4 +1,4 @@
-"""What can be told of any flow: whether it is steady, its digest, its divergence."""
+"""Properties of any flow: whether it is steady, its digest, its divergence."""
 
 import hashlib
 import math
@@ -18,7 +18,7 @@ def is_steady(flow: kernel.Flow) -> bool:
 
 
 def flow_sha256(flow: kernel.Flow | Terrain) -> str:
-    """A digest of everything the kernels can read of a flow, or of a terrain."""
+    """Return a digest of everything that the kernels can read of a flow or of a terrain."""
     text = hashlib.sha256(type(flow).__name__.encode())
     for name, value in kernel.fields_of(flow).items():
         array = np.ascontiguousarray(value)
@@ -27,9 +27,10 @@ def flow_sha256(flow: kernel.Flow | Terrain) -> str:
 
 
 def divergence_ratio(flow: kernel.Flow, x: Range, y: Range, z: Range, t: float = 0.0, count: int = 4096) -> float:
-    """Rms horizontal divergence over rms vorticity in a box [m]; the stream value needs it small.
+    """Return the ratio of rms horizontal divergence to rms vorticity in a box [m].
 
-    0 where the flow has neither; inf where it only diverges.
+    The stream value needs a small ratio. The ratio is 0 where the flow has neither, and inf where it has
+    divergence but no vorticity.
     """
     step = 1e-3 * min(flow.extent.length_scale, x[1] - x[0], y[1] - y[0])
     share = np.random.default_rng(0).random((3, count))

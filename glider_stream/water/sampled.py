@@ -1,4 +1,4 @@
-"""Analytic flows sampled once on a grid, and how far the grid is off."""
+"""Analytic flows sampled once on a grid, and the error of the grid."""
 
 import math
 from functools import partial
@@ -12,16 +12,19 @@ from ..kernels import flow as kernel
 from .inspect import is_steady
 
 LINES_AT_ONCE = 8
-"""Lines of a sampled grid that a thread takes at once."""
+"""A thread evaluates this many lines of the grid at a time."""
 
 MAX_SAMPLES = 100_000_000
-"""Largest grid [points] that `sampled` makes: 1.6 GB."""
+"""The largest grid [points] that `sampled` may make; it takes 1.6 GB."""
 
 
 def sample_flow(
     flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range
 ) -> kernel.Grid:
-    """The flow read on an even grid over a box [m], no coarser than `spacing` [m]; trilinear between."""
+    """Return the flow on an even grid over a box [m], interpolated trilinearly.
+
+    `spacing` [m] is the largest spacing along x, y and z.
+    """
     require(is_steady(flow), "`flow.sampled` needs a steady flow; this one changes with time")
     known = flow.extent
     box = [(max(x[0], known.x_lo), min(x[1], known.x_hi)), (max(y[0], known.y_lo), min(y[1], known.y_hi)), z]
@@ -58,7 +61,7 @@ def sample_flow(
 
 
 def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, z: Range) -> float:
-    """The most [m/s] that a flow read on a grid is off, at 4096 points of a box [m]."""
+    """Return the largest error [m/s] of a sampled flow at 4096 points of a box [m]."""
     lo, hi = np.array([x, y, z]).T
     px, py, pz = (lo + np.random.default_rng(0).random((4096, 3)) * (hi - lo)).T.copy()
     now = np.zeros(px.size)

@@ -1,4 +1,4 @@
-"""Where gliders may not be: seabed, land, keep-out polygons, as one raster of the local frame."""
+"""Places that gliders must not enter (seabed, land, keep-out polygons), as a raster of the local frame."""
 
 import json
 import math
@@ -19,32 +19,39 @@ from .ocean.bottom import Bottom
 from .ocean.names import Names
 
 LAND = 0.0
-"""The height [m] of what no glider may enter at any depth."""
+"""Cells with this height [m] are closed at all depths."""
 SIDE = 512
-"""Cells of the raster along its longer side, at most."""
+"""The raster has at most this many cells along its longer side."""
 FINEST = 25.0
-"""The smallest cells [m]; below, legs are looked at every 5 m."""
+"""The cells are at least this large [m]; finer ones do not help, because legs are checked every 5 m."""
 WALL = 10.0
-"""The raster keeps this far [m] from what it stands for: half a look of a leg, and what a map of a grid errs."""
+"""The raster keeps this distance [m] from land and polygons.
+
+It covers half the distance between two checks of a leg and the error of the map of a grid.
+"""
 MOST_TEXT = 50_000_000
-"""The most that a file of polygons may hold [bytes]."""
+"""A file of polygons may hold at most this many bytes."""
 MOST_VERTICES = 200_000
-"""Of one polygon, and pieces of its rim."""
+"""A polygon may have at most this many vertices, and its rim at most this many pieces."""
 MOST_CROSSED = 300
-"""Vertices of a polygon that crosses itself: mended within a second; 3,000 took minutes and 3.7 GB."""
+"""A polygon that crosses itself may have at most this many vertices.
+
+Repairing it takes less than a second; with 3,000 vertices it took minutes and 3.7 GB.
+"""
 SEEN, POLE = 60.0, 0.1
-"""Polygons are looked at within so many degrees of longitude, and but so far from the poles."""
+"""Polygons are used within SEEN degrees of longitude of the frame's centre and up to POLE degrees from a pole."""
 DENSE = 0.02
-"""Polygons' edges are straight in degrees; in the frame they are drawn in pieces as long as this [degrees]."""
+"""The edges of polygons are straight in degrees; in the frame they are drawn in pieces of this length [degrees].
+"""
 
 
 @dataclass(frozen=True)
 class TerrainSettings:
-    """The block [terrain]: what is kept out of, beside what the current file says of its land and bottom.
+    """The block [terrain]: closed areas in addition to the land and bottom of the current file.
 
-    `bathymetry`: a file of the bottom, `variable`, `positive` and `names` (lon, lat, units, group) where it
-    does not say them itself; `clearance` [m] above any seabed; `max_depth` [m]; `land_distance` [m] to all
-    land; `keep_out`: files of GeoJSON polygons.
+    `bathymetry`: a file with the height of the bottom. `variable`, `positive` and `names` (lon, lat, units,
+    group) are needed where the file does not give them. `clearance` [m]: distance above any seabed. `max_depth`
+    [m]. `land_distance` [m]: distance from all land. `keep_out`: files of GeoJSON polygons.
     """
 
     bathymetry: str | None = None
@@ -65,16 +72,17 @@ class TerrainSettings:
         alone = self.bathymetry is not None or (self.variable, self.positive, self.names) == (None, None, None)
         require(
             alone,
-            "`terrain.variable`, `terrain.positive` and `terrain.names` are of a bathymetry; name the file "
+            "`terrain.variable`, `terrain.positive` and `terrain.names` describe a bathymetry; also name its "
+            "file as "
             "`bathymetry`",
         )
 
 
 class Raster:
-    """Even cells of the local frame, each with the highest bottom that any place in it may have."""
+    """Square cells of the local frame; each cell keeps the highest bottom that any place in it may have."""
 
     def __init__(self, frame: LocalFrame, low: Array, high: Array) -> None:
-        """Cells over the box from `low` to `high` (2,) [m]."""
+        """Make the cells over the box from `low` to `high` (2,) [m]."""
         self.frame, self.low = frame, low
         self.step = max(float((high - low).max()) / SIDE, FINEST)
         self.count = np.ceil((high - low) / self.step).astype(np.int64) + 1
@@ -83,7 +91,7 @@ class Raster:
         self.land = np.zeros(tuple(self.count), dtype=bool)
 
     def _corners(self) -> tuple[Array, Array]:
-        """The corners of the cells about the points, WALL further out on either side: (2 ni, 2 nj)."""
+        """Return x, y (2 ni, 2 nj) [m] of the corners of the cells about the points, moved outward by WALL."""
         axes = []
         for n in range(2):
             middle = self.low[n] + self.step * np.arange(self.count[n])
@@ -93,8 +101,8 @@ class Raster:
         return x, y
 
     def add_bottom(self, bottom: Bottom) -> None:
-        """Take the highest of all points that a place in a cell may read."""
-        from scipy.ndimage import maximum_filter  # a twentieth of a second, which few starts need
+        """Raise each cell to the highest point of the bottom that a place in it may read."""
+        from scipy.ndimage import maximum_filter  # importing it takes 0.05 s, and few runs need it
 
         at = bottom.grid.indices(self.frame, *self._corners())
         ni, nj = self.count
@@ -105,13 +113,13 @@ class Raster:
         end = np.ceil(high) if bottom.between else np.floor(high + 0.5)
         first, end = (np.clip(part, 0, last).astype(np.int64) for part in (first, end))
         unknown = ((high < -0.5) | (low > last + 0.5)).any(axis=-1)
-        # one window for all cells, as large as the largest needs, about the middle of each
+        # all cells use one window about their middle, as large as the largest cell needs
         size = 2 * (int((end - first).max() + 1) // 2) + 1
         middle = (first + end) // 2
 
         def highest(values: Array) -> Array:
             here = maximum_filter(values, size=size, mode="nearest")[middle[..., 1], middle[..., 0]]
-            return np.where(unknown, LAND, here)  # what a file does not hold, nobody flies over
+            return np.where(unknown, LAND, here)  # where the file has no data, the sea is closed
 
         ground = highest(bottom.height if bottom.ground is None else bottom.ground)
         self.ground = np.maximum(self.ground, ground)
@@ -119,7 +127,7 @@ class Raster:
         self.bottom = np.maximum(self.bottom, ground if bottom.ground is None else highest(bottom.height))
 
     def add_polygons(self, polygons: Sequence[Any]) -> None:
-        """No depth is open in a cell that a polygon touches."""
+        """Close all depths in every cell that a polygon touches."""
         import shapely
 
         x, y = (self.low[n] + self.step * np.arange(self.count[n]) for n in range(2))
@@ -136,16 +144,16 @@ class Raster:
             self.bottom[np.ix_(i, j)] = np.where(touched, np.inf, self.bottom[np.ix_(i, j)])
 
     def seabed(self, clearance: float, max_depth: float | None, land_distance: float) -> Seabed:
-        """The bottom as the kernels read it."""
+        """Return the bottom as the kernels read it; distances are in metres."""
         closed = self.land | (self.bottom >= LAND)
         if land_distance > 0 and self.land.any():
             from scipy.ndimage import distance_transform_edt
 
-            # from the edge of a cell, not from its middle
+            # the distance counts from the edge of a cell, not from its middle
             near = distance_transform_edt(~self.land) * self.step - self.step * math.sqrt(0.5) <= land_distance
             closed |= near
         lowest = -np.inf if max_depth is None else -max_depth
-        # clearance counts from the seabed, not from where a file's data end
+        # the clearance counts from the seabed, not from the depth where a file's data end
         bottom = np.where(closed, LAND, np.maximum(np.maximum(self.ground + clearance, self.bottom), lowest))
         ends = self.count - 1.0
         corner = np.array([[[0.0, 0.0], [0.0, ends[1]]], [[ends[0], 0.0], [ends[0], ends[1]]]])
@@ -156,15 +164,15 @@ class Raster:
 
 
 def read_polygons(file: str | Path, frame: LocalFrame) -> list[Any]:
-    """The polygons of a GeoJSON file in the frame [m]; InputError where it holds anything else.
+    """Return the polygons of a GeoJSON file in the frame [m]; InputError if the file holds anything else.
 
     An edge longer than 180 degrees is taken the short way, across the date line.
     """
-    return [part for one in _polygons(file) for part in _in_frame(one, frame)]
+    return [part for polygon in _polygons(file) for part in _in_frame(polygon, frame)]
 
 
 def _polygons(file: str | Path) -> list[Any]:
-    """The polygons and multipolygons of a file [degrees], as they are written."""
+    """Return the polygons and multipolygons of a file [degrees], as they are written."""
     try:
         import shapely
         import shapely.geometry
@@ -178,9 +186,9 @@ def _polygons(file: str | Path) -> list[Any]:
         f"{path.name} holds {size:,} bytes, more than polygons need ({MOST_TEXT:,}); simplify it",
     )
     try:
-        # some editors begin a file with a byte order mark
+        # some editors write a file with a byte order mark
         table = json.loads(path.read_text(encoding="utf-8-sig"))
-        found = [shapely.geometry.shape(one) for one in _geometries(table)]
+        found = [shapely.geometry.shape(shape) for shape in _geometries(table)]
     except (
         OSError,
         ValueError,
@@ -190,21 +198,21 @@ def _polygons(file: str | Path) -> list[Any]:
         RecursionError,
         shapely.errors.ShapelyError,
     ) as error:
-        said = " ".join(str(error).split())[:200]
-        raise InputError(f"{path.name} is no GeoJSON of polygons: {said}; export it again") from None
+        message = " ".join(str(error).split())[:200]
+        raise InputError(f"{path.name} is not a GeoJSON file of polygons: {message}; export it again") from None
     require(len(found) > 0, f"{path.name} holds no polygon; leave it out")
-    for one in found:
-        kind = one.geom_type
+    for shape in found:
+        kind = shape.geom_type
         require(kind in ("Polygon", "MultiPolygon"), f"{path.name} holds a {kind}: a keep-out area is a polygon")
-        bounds = np.array(one.bounds if not one.is_empty else [np.nan] * 4)
+        bounds = np.array(shape.bounds if not shape.is_empty else [np.nan] * 4)
         on_earth = bool((np.abs(bounds) <= [540, 90, 540, 90]).all())  # False for NaN, too
         require(on_earth, f"{path.name} holds a polygon that is empty or not in degrees; mend it")
-    whole = (part for one in found for part in getattr(one, "geoms", [one]))
+    whole = (part for shape in found for part in getattr(shape, "geoms", [shape]))
     return [_simple(path.name, _the_short_way(path.name, part)) for part in whole]
 
 
 def _the_short_way(name: str, polygon: Any) -> Any:
-    """A polygon [degrees] none of whose edges goes more than half around the globe; whole circles stay."""
+    """Return the polygon [degrees] with edges of at most 180 degrees of longitude; full circles stay."""
     import shapely
 
     rings = []
@@ -225,12 +233,12 @@ def _the_short_way(name: str, polygon: Any) -> Any:
 
 
 def _in_frame(polygon: Any, frame: LocalFrame) -> list[Any]:
-    """The parts of a polygon [degrees] that lie about the frame [m]."""
+    """Return the parts of a polygon [degrees] that lie near the frame, as polygons in metres."""
     import shapely
     import shapely.affinity
 
     flat = shapely.make_valid(polygon)
-    # what is on the other side of the globe has no place in a flat frame
+    # a flat frame cannot show the other side of the globe
     near = shapely.box(frame.lon - SEEN, -90 + POLE, frame.lon + SEEN, 90 - POLE)
     result = []
     for turn in (-720, -360, 0, 360, 720):
@@ -245,7 +253,7 @@ def _in_frame(polygon: Any, frame: LocalFrame) -> list[Any]:
 
 
 def _simple(name: str, polygon: Any) -> Any:
-    """A polygon that can be made valid; InputError where that would take for ever."""
+    """Return the polygon if it can be made valid in short time, else raise InputError."""
     import shapely
 
     count = int(shapely.get_num_coordinates(polygon))
@@ -253,38 +261,38 @@ def _simple(name: str, polygon: Any) -> Any:
     require(fits, f"{name} holds a polygon of {count:,} vertices; simplify it to {MOST_VERTICES:,}")
     if count <= MOST_CROSSED or shapely.is_valid(polygon):
         return polygon
-    # each crossing of two edges becomes a vertex, so their number grows with the square
-    few = f"with {count:,} vertices, too many to be mended here; give one of at most {MOST_CROSSED}, or mend it"
+    # each crossing of two edges becomes a vertex, so the work grows with the square of their number
+    few = f"with {count:,} vertices, too many to be mended here; mend it, or give at most {MOST_CROSSED}"
     raise InputError(f"{name} holds a polygon that crosses itself, {few}")
 
 
-def _words_on(file: str, polygons: Sequence[Any], frame: LocalFrame, domain: tuple[Array, Array]) -> str:
-    """How many polygons lie in a domain [m], and their area; a warning where none does."""
+def _count_inside(file: str, polygons: Sequence[Any], frame: LocalFrame, domain: tuple[Array, Array]) -> str:
+    """Return a text with the number of polygons in a domain [m] and their area; warn if no polygon lies in it."""
     import shapely
 
     box = shapely.box(*domain[0][:2], *domain[1][:2])
-    inside = [part for one in polygons for part in _in_frame(one, frame) if part.intersects(box)]
+    inside = [part for polygon in polygons for part in _in_frame(polygon, frame) if part.intersects(box)]
     name = Path(file).name
     if inside:
         area = shapely.union_all(inside).intersection(box).area / 1e6
         return f"keep-out polygons of {name}: {len(inside)} of {len(polygons)} in the domain, {area:.3g} km2"
-    said = f"warning: the keep-out polygons of {name} touch nothing of the domain"
-    swapped = [one for one in polygons if np.abs(np.asarray(one.bounds)[[0, 2]]).max() <= 90]
-    turned = [shapely.transform(one, lambda at: at[:, ::-1]) for one in swapped]
-    if any(part.intersects(box) for one in turned for part in _in_frame(one, frame)):
-        said += ": are longitude and latitude swapped? The other way round they lie in it"
-    warnings.warn(said.removeprefix("warning: "), InputWarning, stacklevel=3)
-    return said
+    message = f"warning: the keep-out polygons of {name} do not touch the domain"
+    swapped = [polygon for polygon in polygons if np.abs(np.asarray(polygon.bounds)[[0, 2]]).max() <= 90]
+    turned = [shapely.transform(polygon, lambda at: at[:, ::-1]) for polygon in swapped]
+    if any(part.intersects(box) for polygon in turned for part in _in_frame(polygon, frame)):
+        message += ": are longitude and latitude swapped? If swapped back, they lie in it"
+    warnings.warn(message.removeprefix("warning: "), InputWarning, stacklevel=3)
+    return message
 
 
 def _geometries(table: Any) -> list[Any]:
     kind = table["type"]
     if kind == "FeatureCollection":
-        return [one for feature in table["features"] for one in _geometries(feature)]
+        return [geometry for feature in table["features"] for geometry in _geometries(feature)]
     if kind == "Feature":
         return [] if table["geometry"] is None else _geometries(table["geometry"])
     if kind == "GeometryCollection":
-        return [one for part in table["geometries"] for one in _geometries(part)]
+        return [geometry for part in table["geometries"] for geometry in _geometries(part)]
     return [table]
 
 
@@ -296,21 +304,22 @@ def raster_terrain(
     bottoms: Sequence[Bottom],
     domain: tuple[Array, Array] | None = None,
 ) -> tuple[Seabed, str]:
-    """Terrain over a box of the frame, from `low` to `high` (2,) [m], of bottoms and polygons; words on it.
+    """Return the terrain over a box of the frame from `low` to `high` (2,) [m], and a description of it.
 
-    `domain`: the corners [m] of the part that is planned in, if that is smaller.
+    `bottoms` and the polygons of `settings` are combined. `domain`: the corners [m] of the planned part, if it is
+    smaller than the box.
     """
     raster = Raster(frame, low, high)
-    words = []
+    description = []
     for bottom in bottoms:
         raster.add_bottom(bottom)
-        words.append(bottom.words)
+        description.append(bottom.description)
     for file in settings.keep_out:
         polygons = _polygons(file)
-        raster.add_polygons([part for one in polygons for part in _in_frame(one, frame)])
-        words.append(_words_on(file, polygons, frame, domain or (low, high)))
+        raster.add_polygons([part for polygon in polygons for part in _in_frame(polygon, frame)])
+        description.append(_count_inside(file, polygons, frame, domain or (low, high)))
     for what, value in (("clearance", settings.clearance), ("distance from land", settings.land_distance)):
-        words += [f"{what} {value:g} m"] if value else []
-    words += [] if settings.max_depth is None else [f"no deeper than {settings.max_depth:g} m"]
+        description += [f"{what} {value:g} m"] if value else []
+    description += [] if settings.max_depth is None else [f"no deeper than {settings.max_depth:g} m"]
     seabed = raster.seabed(settings.clearance, settings.max_depth, settings.land_distance)
-    return seabed, ", ".join([*words, f"in cells of {raster.step:.0f} m"])
+    return seabed, ", ".join([*description, f"in cells of {raster.step:.0f} m"])

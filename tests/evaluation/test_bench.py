@@ -23,6 +23,7 @@ def record(**medians):
     return Record(tuple(figures), {"date": "now"})
 
 
+@pytest.mark.slow
 def test_all_parts_give_figures(tmp_path, capsys):
     ceiling = tmp_path / "ceiling"
     ceiling.write_text(CEILING.format(sys.executable))

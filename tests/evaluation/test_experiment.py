@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import bootstrap
 
+pytestmark = pytest.mark.slow
+
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 SCRIPTS = ("edges_by_controls", "route_by_controls", "route_by_time")
 

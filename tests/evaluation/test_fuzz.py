@@ -10,6 +10,8 @@ import pytest
 
 from glider_stream.scenario import scenario_from_table
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("networkx")
 FILE = Path(__file__).parents[2] / "benchmarks/fuzz_scenarios.py"
 SPEC = importlib.util.spec_from_file_location("fuzz_scenarios", FILE)

@@ -14,6 +14,8 @@ from glider_stream import planner
 from glider_stream.evaluation import baselines, suite
 from glider_stream.scenario import read_scenario
 
+pytestmark = pytest.mark.slow
+
 CLOSED = ("uniform-current", "jet-crossing", "solid-rotation")
 
 

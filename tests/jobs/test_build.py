@@ -27,6 +27,8 @@ from glider_stream.roadmap.provenance import provenance_of
 from glider_stream.roadmap.roadmap import Edges, in_order
 from glider_stream.roadmap.store import read_part, read_roadmap
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
@@ -145,7 +147,7 @@ def test_restart_begins_anew_and_another_build_is_refused(place):
     build_file(other, "road.h5", job=Job(restart=True))
     assert read_roadmap("road.h5").provenance.flow_sha256 != provenance_of(one, np.zeros((1, 3))).flow_sha256
     Path("b.h5.journal").write_text("my diary")
-    with pytest.raises(InputError, match="is in the way of this build's journal"):
+    with pytest.raises(InputError, match="has the name of this build's journal"):
         build_file(one, "b.h5")
     assert Path("b.h5.journal").read_text() == "my diary"
 
@@ -213,12 +215,12 @@ def test_parts_that_do_not_fit(place):
         ("part1.h5", "part3.h5"): "part 2 of 3 is missing",
         ("part2.h5",): "parts 1, 3 of 3 are missing",
         ("part1.h5", "part2.h5", "part2.h5"): "part2.h5 and part2.h5 are both part 2/3",
-        ("part1.h5", "half.h5"): "half.h5 is part 1/2 and part1.h5 part 1/3",
+        ("part1.h5", "half.h5"): "half.h5 is part 1/2 but part1.h5 is part 1/3",
         (
             "part1.h5",
             "part2.h5",
             "other.h5",
-        ): "other.h5 is of another roadmap than part1.h5: scenario_sha256 differ",
+        ): "other.h5 belongs to another roadmap than part1.h5: scenario_sha256 differ",
         ("part1.h5", "whole.h5"): "whole.h5 is not a part of a roadmap",
         ("none.h5",): "does not exist",
     }.items():
@@ -309,7 +311,7 @@ def test_a_command_that_is_killed_goes_on(place):
             time.sleep(0.01)
         said = running.communicate()[1]
     assert running.returncode == 130, said
-    assert "nodes are kept in road.h5.journal: give the same command again to go on" in said
+    assert "nodes are kept in road.h5.journal: give the same command again to continue" in said
     assert "Traceback" not in said
     done = subprocess.run([executable(), *scenario], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

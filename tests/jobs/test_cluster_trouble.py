@@ -10,7 +10,8 @@ from glider_stream.jobs.build import Job, build_file
 from glider_stream.roadmap.builder import find_edges
 
 distributed = pytest.importorskip("distributed")
-pytestmark = pytest.mark.filterwarnings("ignore")  # what dask says while it ends is its own
+# what dask says while it ends is its own
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ class Ending(cluster.Cluster):
 def test_a_scheduler_that_ends(place):
     """What it found is kept, and the build goes on without it."""
     seen = []
-    words = r"the cluster failed: .*scheduler-connection-lost; give the same command to go on, here or with"
+    words = r"the cluster failed: .*scheduler-connection-lost; give the same command to continue, here or with"
     job = Job(finder=Ending(None, 1).find_edges)
     with pytest.raises(InputError, match=words):
         build_file(problem(place), "road.h5", progress=seen.append, batch_pairs=BATCH // 4, job=job)

@@ -17,6 +17,8 @@ from glider_stream.base import lock
 from glider_stream.base.errors import InputError
 from glider_stream.base.lock import locked
 
+pytestmark = pytest.mark.slow
+
 NO_LOCKS = [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL]
 
 

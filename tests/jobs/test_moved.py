@@ -15,6 +15,8 @@ from glider_stream.base.errors import InputError, Stopped
 from glider_stream.jobs.build import Job, build_file, merge, shard_of
 from glider_stream.scenario import read_scenario, scenario_of
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("xarray")
 QUERY = "\n[query]\nstart = [10.3, 40.3, 0.0]\ngoal = [10.35, 40.35, 0.0]\n"
 SMALL = ("sampling.count=60", "neighbours.k=8")

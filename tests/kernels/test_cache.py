@@ -15,37 +15,32 @@ import pytest
 import glider_stream
 
 KERNELS = Path(glider_stream.__file__).parent / "kernels"
-ONE_PAIR = """
+ONE_LEG = """
 import json, math, sys, time
 sys.path.insert(0, sys.argv[1])
 import glider_stream
+from glider_stream.kernels.edges import Edge
+from glider_stream.kernels.terrain import OpenWater
 from glider_stream.roadmap.evaluator import Evaluator
 from glider_stream.roadmap.steering import IntegrationSettings, SurfaceMethod
-from glider_stream.water.analytic import Uniform
 from glider_stream.vehicle.polar import polar
 from glider_stream.vehicle.presets import PRESETS
-from glider_stream.kernels.terrain import OpenWater
+from glider_stream.water.analytic import Uniform
 assert glider_stream.__file__.startswith(sys.argv[1])
-judge = Evaluator(
+evaluator = Evaluator(
     Uniform(0.1, 0.2).kernel((-200.0, 0.0)),
     OpenWater(-math.inf),
     polar(PRESETS["paper"]),
     SurfaceMethod(400),
     IntegrationSettings(5.0, 125, 20.0),
 )
+northward = Edge(0, 100.0, 100.0, -0.5, math.pi / 2, 0.5, 0.0)
 began = time.perf_counter()
-edge = judge.connect_pair([0.0, 0.0, 0.0], [80.0, 60.0, -100.0])
-print(json.dumps({"seconds": time.perf_counter() - began, "status": edge.status, "cost": edge.cost}))
+rows = evaluator.trace([0.0, 0.0, 0.0], northward, 0.0)
+print(json.dumps({"seconds": time.perf_counter() - began, "eastward": rows[-1, 1]}))
 """
-EDIT = """
-
-_of_the_file = edge_cost
-
-
-@kernel
-def edge_cost(*given):
-    return 2.0 * _of_the_file(*given)
-"""
+"""A leg that heads north is carried eastward by the current alone."""
+UNIFORM = "    return flow.u, flow.v\n"
 
 
 @pytest.fixture
@@ -57,9 +52,9 @@ def copy(tmp_path):
 
 
 def run(folder):
-    """One pair, evaluated in a new process."""
+    """One leg, flown in a new process."""
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    program = [sys.executable, "-W", "error", "-c", ONE_PAIR, str(folder)]
+    program = [sys.executable, "-W", "error", "-c", ONE_LEG, str(folder)]
     out = subprocess.run(program, env=environment, check=True, capture_output=True, text=True, cwd=folder)
     return json.loads(out.stdout)
 
@@ -70,21 +65,24 @@ def cached(folder):
     return {path.relative_to(folder): path.stat().st_mtime_ns for path in found}
 
 
+@pytest.mark.slow
 def test_a_new_process_starts_from_disk_and_an_edit_is_never_stale(copy):
     cold = run(copy)
     files = cached(copy)
-    assert cold["status"] == 0
+    assert cold["eastward"] == pytest.approx(10.0, abs=1e-9)
     assert files
     warm = run(copy)
     assert cached(copy) == files
     assert warm["seconds"] < 3.0
     assert warm["seconds"] < 0.5 * cold["seconds"]
-    assert warm["cost"] == cold["cost"]
+    assert warm["eastward"] == cold["eastward"]
     # not the entry point's own file: numba alone would answer from the cache
-    with (copy / "glider_stream/kernels/cost.py").open("a") as source:
-        source.write(EDIT)
+    source = copy / "glider_stream/kernels/flow.py"
+    text = source.read_text()
+    assert UNIFORM in text
+    source.write_text(text.replace(UNIFORM, "    return 2.0 * flow.u, flow.v\n"))
     edited = run(copy)
-    assert edited["cost"] == 2 * cold["cost"]
+    assert edited["eastward"] == pytest.approx(20.0, abs=1e-9)
     assert set(cached(copy)) > set(files)
 
 

@@ -52,6 +52,7 @@ def test_finds_what_brute_force_finds(judge, position, on_levels):
     assert (legs[both] <= true[both] + 1.0).mean() >= 0.99
 
 
+@pytest.mark.slow
 def test_legs_end_at_their_targets(judge, position):
     for n, k, row in list(zip(*found(judge, position, [0, 1]), strict=True))[::7]:
         if row[0] == CONNECTED:

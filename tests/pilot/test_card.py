@@ -49,7 +49,7 @@ def test_station_can_be_held_up_to_the_best_speed_and_not_beyond():
     assert not card(route(stops=DIVES), problem(current + 1e-6)).whole.outrun
     said = card(route(stops=DIVES), problem(current - 1e-6))
     assert all(row.outrun for row in said.legs)
-    assert str(said).endswith("faster than the vehicle's 0.36 m/s: no holding station on legs 1, 2, 3, 4")
+    assert str(said).endswith("faster than the vehicle's 0.36 m/s: it cannot hold station on legs 1, 2, 3, 4")
 
 
 def test_one_dive_and_none():

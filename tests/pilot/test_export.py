@@ -159,7 +159,7 @@ GOOD = goto_list([Waypoint(-74.19, 39.45), Waypoint(-73.9, 39.3)])
         ("num_waypoints(nodim) 2", "num_waypoints(nodim) 3", "num_waypoints is 3"),
         ("-7411.4000\t3927.0000", "3927.0000\t-11411.4000", "latitude"),
         ("-7411.4000", "-74°11.4", "ASCII"),
-        ("-7411.4000", "# -7411.4000", "num_waypoints is 2, and there are 1"),
+        ("-7411.4000", "# -7411.4000", "num_waypoints is 2, but there are 1"),
         ("initial_wpt(enum) 0", "initial_wpt(enum) -7411.4", "initial_wpt"),
         ("num_legs_to_run(nodim) -2", "num_legs_to_run(nodim) 0", "num_legs_to_run"),
         ("-7411.4000", "-7461.4000", "61.4"),

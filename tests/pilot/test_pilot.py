@@ -102,7 +102,7 @@ def test_where_the_water_outruns_the_vehicle(search):
     problem = replace(search.problem, evaluator=replace(search.problem.evaluator, polar=polar))
     said = card(search.query(), problem)
     assert said.whole.outrun
-    assert "no holding station on legs" in str(said)
+    assert "it cannot hold station on legs" in str(said)
 
 
 # thinning

@@ -53,14 +53,14 @@ def test_in_metres_heights_count_upward_and_depths_downward(tmp_path, header, de
 @pytest.mark.parametrize(
     ("header", "words"),
     [
-        ("lon,lat,max_depth", "its column 'max_depth' holds numbers, and their meaning is not known"),
+        ("lon,lat,max_depth", "its column 'max_depth' holds numbers of unknown meaning"),
         ("lon,lat,target depth (m)", "'target depth .m.' holds numbers"),
         ("lon,lat,z", "column 'z' may count up or down"),
         ("lon,lat,pressure", "'pressure' holds numbers"),
         ("lon,lat,depth (dbar)", "the unit of its column 'depth .dbar.' is not known; give it in m, km"),
         ("lon (rad),lat,depth", "the unit of its column 'lon .rad.' is not known; give it in degrees"),
-        ("lon,longitude,lat", "'lon' and 'longitude' say the same"),
-        ("depth,lat,lon,altitude", "'depth' and 'altitude' say the same"),
+        ("lon,longitude,lat", "'lon' and 'longitude' mean the same"),
+        ("depth,lat,lon,altitude", "'depth' and 'altitude' mean the same"),
         ("lon,lat,x,y", "columns for lon, lat and for x, y"),
     ],
 )
@@ -109,7 +109,7 @@ def test_properties_of_points_say_their_depth(tmp_path, told):
         ([("LineString", [[1, 2], [1, 3]], {"depth": [5, 6]})], "its line has a property 'depth'"),
         (
             [("Point", [1, 2], {"depth": "5 m"}), ("Point", [1, 3], {})],
-            "property 'depth' is '5 m', and not a number",
+            "property 'depth' is '5 m', which is not a number",
         ),
         ([("Point", [1, 2], {"dive": "5 m"}), ("Point", [1, 3], {})], "property 'dive' holds numbers"),
         ([("LineString", [[1, 2], [1, 3]], {"dive": 5})], "property 'dive' holds numbers"),

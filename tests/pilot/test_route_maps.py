@@ -107,7 +107,7 @@ def test_data_of_a_placemark_say_its_depth(tmp_path):
     data = '<ExtendedData><Data name="depth"><value>200</value></Data></ExtendedData>'
     places = kml(tmp_path, mark("a", "18.4,38") + mark("b", "18.5,38.1", data=data)).places
     assert places[1][2] == 200.0
-    with pytest.raises(InputError, match="its data 'depth' is '200 m', and not a number"):
+    with pytest.raises(InputError, match="its data 'depth' is '200 m', which is not a number"):
         kml(tmp_path, mark("a", "18.4,38") + mark("b", "18.5,38.1", data=data.replace("200", "200 m")))
     unknown = data.replace('"depth"', '"dive"')
     with pytest.raises(InputError, match="its data 'dive' holds numbers"):
@@ -166,7 +166,7 @@ def test_a_gpx_of_an_earlier_version_is_read_whole_or_refused(tmp_path):
     assert np.abs(in_frame(read_drawn(file).places) - np.array(STOPS)).max() < 0.5
     tree.getroot().remove(tree.find("g:trk", spaces))
     tree.write(file)
-    with pytest.raises(InputError, match="not where the route begins; export the route again"):
+    with pytest.raises(InputError, match="not the start of the route; export the route again"):
         read_drawn(file)
 
 

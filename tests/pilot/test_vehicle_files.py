@@ -36,7 +36,7 @@ def test_lists_of_an_earlier_longer_route_are_removed_and_that_is_said(tmp_path)
     export_path(surfacings(3), tmp_path / "goto_l10.ma", said.append)
     assert names(tmp_path) == ["goto_l10.ma", "yo10.ma"]
     assert said == [
-        f"removed {tmp_path / name}, which an earlier, longer route had left"
+        f"removed {tmp_path / name}, which was left by an earlier, longer route"
         for name in ("goto_l11.ma", "goto_l12.ma")
     ]
 
@@ -51,7 +51,7 @@ def test_what_a_pilot_wrote_or_changed_stays(tmp_path):
     export_path(surfacings(3), tmp_path / "goto_l10.ma", said.append)
     assert names(tmp_path) == ["goto_l10.ma", "goto_l12.ma", "goto_l14.ma", "yo10.ma"]
     assert len(said) == 3
-    assert f"{changed} is of an earlier route, and was changed since: it stays" in said[1]
+    assert f"{changed} belongs to an earlier route and was changed by hand, so it stays" in said[1]
 
 
 def test_lists_of_another_route_stay(tmp_path):
@@ -79,10 +79,10 @@ def test_waypoints_and_radius_are_options(tmp_path):
     ("name", "options", "words"),
     [
         ("goto_l10.ma", {"most_waypoints": 0}, "from 1 to 99 waypoints; got 0"),
-        ("goto_l10.ma", {"arrival_radius": 5.0}, "within 10 m or more; got 5"),
-        ("goto_l10.ma", {"arrival_radius": math.nan}, "10 m or more; got nan"),
-        ("targets", {"arrival_radius": 0.0}, "more than 0 m; got 0"),
-        ("targets", {"arrival_radius": math.inf}, "more than 0 m; got inf"),
+        ("goto_l10.ma", {"arrival_radius": 5.0}, "at least 10 m; got 5"),
+        ("goto_l10.ma", {"arrival_radius": math.nan}, "at least 10 m; got nan"),
+        ("targets", {"arrival_radius": 0.0}, "above 0 m; got 0"),
+        ("targets", {"arrival_radius": math.inf}, "above 0 m; got inf"),
     ],
 )
 def test_options_out_of_bounds(tmp_path, name, options, words):
@@ -126,10 +126,15 @@ def test_a_list_of_ours_is_scored(geographic, tmp_path, capsys, name):
     assert table["legs"][-1]["to"] == pytest.approx([*path.goal[:2], 0.0], abs=0.2)
     if len(waypoints) == 1:
         refused = command(capsys, "score", road, tmp_path / name)
-        assert (refused.code, "holds one point; say with --start" in refused.err) == (2, True)
+        assert (refused.code, "holds one point; give the vehicle's position with --start" in refused.err) == (
+            2,
+            True,
+        )
     else:
         told = command(capsys, "score", road, tmp_path / name)
-        assert "note: the way to its first point is not scored; say with --start" in told.out
+        assert (
+            "note: the way to its first point is not scored; give the vehicle's position with --start" in told.out
+        )
 
 
 def test_several_files_are_one_route(geographic, tmp_path, capsys):
@@ -151,8 +156,8 @@ def rewritten(folder, old, new, count=3):
     ("old", "new", "words"),
     [
         ("num_waypoints(nodim) 3", "num_waypoints(nodim) 2", "num_waypoints is not 3"),
-        ("1830.0000\t3800.0000", "1830.0000\t9800.0000", "a latitude of 98; the longitude stands first"),
-        ("goto_list", "yo", "the behavior 'yo', and a route is a goto_list"),
+        ("1830.0000\t3800.0000", "1830.0000\t9800.0000", "a latitude of 98; write the longitude first"),
+        ("goto_list", "yo", "the behavior 'yo', but a route is a goto_list"),
         ("behavior_name=goto_list", "", "no behavior_name"),
     ],
 )
@@ -181,7 +186,7 @@ def test_targets_are_followed_by_their_names(tmp_path):
     assert "no goto leads from A to B" in drawn.notes[1]
     assert "flown again and again, from A" in drawn.notes[2]
     (tmp_path / "targets").write_text(text.replace("goto=C", "goto=D"))
-    with pytest.raises(InputError, match="there is no such target; `glider-stream lint` says all"):
+    with pytest.raises(InputError, match="that target does not exist; `glider-stream lint` shows all"):
         read_drawn(tmp_path / "targets")
 
 
@@ -194,7 +199,7 @@ def test_targets_are_followed_by_their_names(tmp_path):
 def test_start_that_is_the_goal_is_refused_before_anything_is_written(geographic, tmp_path, name):
     road, _ = geographic
     place = (18.5, 38.0, 0.0)
-    with pytest.raises(InputError, match=f"its start is its goal, so there is nothing to write into .*{name}"):
+    with pytest.raises(InputError, match=f"its start is its goal; there is nothing to write into .*{name}"):
         planner.query(road, place, place, [tmp_path / "path.json", tmp_path / name])
     assert names(tmp_path) == []
     assert planner.query(road, place, place, [tmp_path / "path.json"]).found
@@ -207,5 +212,5 @@ def test_what_is_not_written_without_a_path_is_said(tmp_path):
     none = replace(surfacings(2), cost=math.inf, legs=())
     assert export_path(none, tmp_path / "route.kml", said.append) == []
     assert export_path(none, tmp_path / "route.gpx", said.append) == []
-    assert "is not written, since there is no path; the file of that name is of an earlier query" in said[0]
-    assert said[1].endswith("is not written, since there is no path")
+    assert "is not written, because no path was found; the file of that name is of an earlier query" in said[0]
+    assert said[1].endswith("is not written, because no path was found")

@@ -195,6 +195,7 @@ def test_a_chart_without_a_leg_or_at_two_depths_is_refused():
         plot.plot_chart(scene.flow, scene.terrain, scene.problem, scene.path, [0, 100])
 
 
+@pytest.mark.slow
 def test_charts_from_the_shell(tmp_path, capsys):
     file, path = tmp_path / "small.h5", tmp_path / "path.json"
     write_roadmap(roadmap(), file)

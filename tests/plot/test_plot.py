@@ -100,6 +100,7 @@ def written(figure):
     return [(text.get_text(), text.get_window_extent()) for text in shown]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_no_label_covers_another_or_leaves_the_page(figures, name):
     texts = written(figures[name])

@@ -51,10 +51,10 @@ def test_the_command_draws_several_files(two, tmp_path, capsys):
     assert drawn.stat().st_size > 10_000
     refused = command(capsys, "plot", road, *files, "-o", drawn, "--chart")
     assert refused.code == 2
-    assert "several routes go with one --depth" in refused.err
+    assert "several routes need one --depth" in refused.err
     refused = command(capsys, "plot", road, files[0], files[0], "-o", drawn)
     assert refused.code == 2
-    assert "each path needs a name of its own" in refused.err
+    assert "each path needs a different name" in refused.err
 
 
 def test_what_cannot_be_compared_is_refused(two):

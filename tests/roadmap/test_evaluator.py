@@ -110,6 +110,7 @@ def test_equals_the_literal_loop_on_a_grid_that_paths_leave(evaluator, sampled, 
     )
 
 
+@pytest.mark.slow
 def test_equals_the_literal_loop_in_a_flow_that_changes_with_time(evaluator, gyre):
     position = nodes(40, seed=3)
     departure = np.random.default_rng(4).uniform(0, 700, 40)

@@ -66,6 +66,7 @@ def assert_same(road, other):
         assert getattr(other, name).tobytes() == getattr(road, name).tobytes(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [FLOW_MAP, REFINED], ids=["flow map", "refined"])
 def test_ties_are_broken_alike_in_every_batch_thread_and_shard(method):
     tied = problem(method)

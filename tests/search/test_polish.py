@@ -157,6 +157,7 @@ def test_in_a_uniform_current_it_is_the_straight_optimum(problem):
     assert after.cost < 1.0001 * best
 
 
+@pytest.mark.slow
 def test_energy_is_what_is_polished_where_the_cost_is_energy(problem):
     from glider_stream.vehicle.cost import Energy
 

@@ -73,6 +73,7 @@ def flown(flow, path):
     return np.array(places)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FLOWS)
 def test_what_is_exported_flies_from_end_to_end(name, tmp_path):
     planner = clock([*FLOWS[name], "query.departure=200.0"])
@@ -222,6 +223,7 @@ def test_the_front_of_time_and_energy_is_exact(flow):
     assert "the least that one takes is" in none.why
 
 
+@pytest.mark.slow
 def test_rules_of_surfacing_hold_with_the_clock_running(gyre):
     ends = gyre.position[-2], gyre.position[-1]
     free = gyre.query(*ends)
@@ -245,6 +247,7 @@ def test_fewer_legs_are_found_at_their_own_times(gyre):
     assert np.linalg.norm(places - [leg.end for leg in fewer.legs], axis=1).max() < 0.1
 
 
+@pytest.mark.slow
 def test_when_to_leave(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     opened = open_scenario("swinging-gyre", GYRE)
@@ -271,7 +274,7 @@ def test_when_to_leave(tmp_path, capsys, monkeypatch):
     for wrong, words in (
         (("--depart-between", "0", "soon"), "must be seconds or a time"),
         (("--depart-between", "9", "1"), "must not lie after the last"),
-        (("--every", "5"), "go with --depart-between"),
+        (("--every", "5"), "need --depart-between"),
         (("--arrive-by", "2024-01-01", "--thin", "5"), "leave|set query.departure"),
         (("--arrive-by", "2024-01-01T00:00"), "has no calendar"),
     ):

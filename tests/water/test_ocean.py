@@ -315,14 +315,14 @@ def without_attr(data, name, key):
 
 REFUSALS = {
     "unit": (lambda d: with_attrs(d, "uo", units="furlong/fortnight"), "furlong/fortnight"),
-    "no unit": (lambda d: renamed(d, "u", "v"), "has no unit .* name `units`"),
+    "no unit": (lambda d: renamed(d, "u", "v"), "has no unit .* set `units`"),
     "no unit and too fast": (lambda d: renamed(units(d, "", 0.01), "uo", "vo"), "has no unit"),
     "wrong unit": (lambda d: both(d, lambda one: 100 * one), "no ocean current"),
     "half staggered": (staggered, "different points that make no staggered grid"),
     "sigma": (lambda d: with_attrs(d, "depth", standard_name="ocean_s_coordinate_g2"), "no depth of the seabed"),
     "pressure": (lambda d: with_attrs(d, "depth", units="dbar"), "'dbar'"),
     "heights": (lambda d: with_attrs(d, "depth", positive="up"), "positive up"),
-    "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no longitude"),
+    "no depths": (lambda d: d.drop_vars("depth"), "`depth` .* has no coordinate that is known"),
     "no time unit": (lambda d: without_attr(d, "time", "units"), "hours since"),
     "odd time unit": (lambda d: with_attrs(d, "time", units="fortnights since 2000-01-01"), "fortnights"),
     "dates that are none": (
@@ -330,7 +330,7 @@ REFUSALS = {
         "360_day",
     ),
     "two members": (lambda d: xr.concat([d, d], "member"), "`member`"),
-    "two candidates": (lambda d: d.assign(a=d.uo, b=d.vo).rename(uo="c", vo="d"), "name `u` and `v`"),
+    "two candidates": (lambda d: d.assign(a=d.uo, b=d.vo).rename(uo="c", vo="d"), "set `u` and `v`"),
     "mooring": (lambda d: d.isel(lon=[0], lat=[0]), "one position"),
     "trajectory": (lambda d: d.assign_attrs(featureType="trajectory"), "trajectory"),
     "mesh": (

@@ -496,11 +496,11 @@ def wrong_angle():
 
 
 REFUSALS = {
-    "curved, and nothing says along what": (lambda: [plain()], "do not say whether .* name `rotate`"),
-    "an angle that is another": (lambda: [wrong_angle()], "`angle` .* name `rotate`"),
+    "curved, and nothing says along what": (lambda: [plain()], "do not say whether .* set `rotate`"),
+    "an angle that is another": (lambda: [wrong_angle()], "`angle` .* set `rotate`"),
     "staggered, yet the places of the centres": (
         lambda: [xr.merge([nemo("u", True), nemo("v", True)], compat="override", join="outer")],
-        "name `stagger`",
+        "set `stagger`",
     ),
     "no depth of the seabed": (lambda: [roms().drop_vars("h")], "no depth of the seabed `h`"),
     "no Vtransform": (
@@ -510,17 +510,17 @@ REFUSALS = {
     "no stretching": (lambda: [roms().drop_vars("Cs_r")], "Cs_r"),
     "no places": (lambda: [along(places=False)], "longitude"),
     "only u": (lambda: [nemo("u")], "no current toward north"),
-    "POP without its own places": (lambda: [pop().drop_vars(["ULONG", "ULAT"])], "TLONG.*name `lon` and `lat`"),
+    "POP without its own places": (lambda: [pop().drop_vars(["ULONG", "ULAT"])], "TLONG.*set `lon` and `lat`"),
     "NEMO with the places of corners alone": (
         lambda: [
             nemo("u").rename(nav_lon="glamf", nav_lat="gphif"),
             nemo("v").rename(nav_lon="glamf", nav_lat="gphif"),
         ],
-        "does not lie at `glamf`.* name `lon` and `lat`",
+        "does not lie at `glamf`.* set `lon` and `lat`",
     ),
     "a mask that tells nothing": (
         lambda: [along().assign(mask=(("y", "x"), np.arange(NY * NX).reshape(NY, NX) % 2))],
-        "`mask` .* name `land`",
+        "`mask` .* set `land`",
     ),
 }
 
@@ -560,6 +560,7 @@ def test_a_user_may_say(tmp_path, make, names):
     )
 
 
+@pytest.mark.slow
 def test_describe_takes_a_users_word(tmp_path):
     path = written(tmp_path, plain())
     program = [sys.executable, "-c", "from glider_stream.cli import main; main()"]

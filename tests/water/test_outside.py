@@ -42,7 +42,7 @@ def test_what_is_said(domain, place, words):
 
 
 def test_a_latitude_that_is_none_may_be_a_longitude():
-    with pytest.raises(InputError, match=f"-19, 179.5 is no longitude .*{SWAPPED}"):
+    with pytest.raises(InputError, match=f"-19, 179.5 are not a longitude .*{SWAPPED}"):
         PACIFIC.point((-19.0, 179.5, 0.0))
     with pytest.raises(InputError, match=r"degrees; give LON,LAT,DEPTH$"):
         IONIAN.point((18.0, 95.0, 0.0))

@@ -53,7 +53,7 @@ def test_no_data_that_is_not_declared_is_land(tmp_path, mark, sea):
     assert (bottom.height[inside] >= 0).all()
     assert (bottom.height < -900).sum() > 300
     if abs(mark) != 999.0 or mark < 0:
-        assert f"{mark:g} (" in bottom.words.replace(",", "")
+        assert f"{mark:g} (" in bottom.description.replace(",", "")
 
 
 @pytest.mark.parametrize("mark", [9999.0, 999.0, 10000.0, -9999.0, 32767.0])
@@ -62,7 +62,7 @@ def test_no_data_among_depths_that_count_down(tmp_path, mark):
     bottom = read_bathymetry(path, FRAME, *DOMAIN, positive="down")
     inside = np.isclose(bottom.grid.mesh()[1], 38.0) & np.isclose(bottom.grid.mesh()[0], 18.0)
     assert (bottom.height[inside] == 0).all()
-    assert f"where {mark:g} (" in bottom.words
+    assert f"where {mark:g} (" in bottom.description
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_depths_and_heights_that_cannot_be_told_are_refused(tmp_path):
     land = np.where(HOLE, 50.0, SLOPE)
     for name, attrs in (("depth", {}), ("bathymetry", {"long_name": "elevation relative to sea level"})):
         path = chart(tmp_path, land, name, units="m", **attrs)
-        with pytest.raises(InputError, match=r'may be a depth or a height.* name `positive`, "up" or "down"'):
+        with pytest.raises(InputError, match=r'may be a depth or a height.* set `positive`, "up" or "down"'):
             read_bathymetry(path, FRAME, *DOMAIN)
         bottom = read_bathymetry(path, FRAME, *DOMAIN, positive="up")
         assert bottom.height.min() < -1500
@@ -116,13 +116,13 @@ def _cut(bottom):
 
 def test_a_chart_takes_names(tmp_path):
     path = chart(tmp_path, SLOPE, "z", ("x", "y"), {}, {}, units="m")
-    with pytest.raises(InputError, match=r"name `lat` in `names`|name it in `names`|name `lon` in `names`"):
+    with pytest.raises(InputError, match=r"set `lat` in `names`|name it in `names`|set `lon` in `names`"):
         read_bathymetry(path, FRAME, *DOMAIN)
     bottom = read_bathymetry(path, FRAME, *DOMAIN, names=Names(lon="x", lat="y"))
     assert bottom.height.min() < -1500
     with pytest.raises(InputError, match="holds no variable `nosuch`, which `lon` names"):
         read_bathymetry(path, FRAME, *DOMAIN, names=Names(lon="nosuch", lat="y"))
-    with pytest.raises(InputError, match=r"`terrain.names` knows .*; got mask"):
+    with pytest.raises(InputError, match=r"`terrain.names` may hold .*; got mask"):
         read_bathymetry(path, FRAME, *DOMAIN, names=Names(mask="x"))
 
 
@@ -190,10 +190,10 @@ def test_keep_out_is_counted_in_the_domain(tmp_path):
     _, words = raster_terrain(TerrainSettings(keep_out=(file,)), FRAME, *BOX, [], BOX)
     assert "keep-out polygons of zones.geojson: 1 of 2 in the domain, 97.5 km2" in words
     swapped = zones(tmp_path, [[y, x] for x, y in ring(17.95, 18.05, 37.95, 38.05)])
-    with pytest.warns(InputWarning, match="touch nothing of the domain: are longitude and latitude swapped"):
+    with pytest.warns(InputWarning, match="do not touch the domain: are longitude and latitude swapped"):
         _, words = raster_terrain(TerrainSettings(keep_out=(swapped,)), FRAME, *BOX, [], BOX)
-    assert "warning: the keep-out polygons of zones.geojson touch nothing of the domain" in words
-    with pytest.warns(InputWarning, match="touch nothing of the domain$"):
+    assert "warning: the keep-out polygons of zones.geojson do not touch the domain" in words
+    with pytest.warns(InputWarning, match="do not touch the domain$"):
         raster_terrain(
             TerrainSettings(keep_out=(zones(tmp_path, ring(5.0, 6.0, 50.0, 51.0)),)), FRAME, *BOX, [], BOX
         )
@@ -238,6 +238,7 @@ kind = "time"
 """
 
 
+@pytest.mark.slow
 def test_a_figure_draws_the_ground_and_no_clearance(tmp_path):
     """The chart's own depth, whatever the clearance, the keep-out, and where the levels of the currents end."""
     lon, lat = np.arange(17.5, 18.51, 0.1), np.arange(37.5, 38.51, 0.1)
@@ -276,6 +277,6 @@ def test_describe_reads_no_more_of_a_large_file_than_it_needs(tmp_path, monkeypa
     )
     assert found.points[1].u_east is None
     assert found.file.u.shape[-1] < lon.size / 2
-    assert "looked at about the places alone" in found.file.notes[-1]
+    assert "only the parts around the given places were read" in found.file.notes[-1]
     monkeypatch.setattr("glider_stream.water.describe.LOOK", LOOK)
     assert describe(path, [(18.55, 38.05, 20.0, None)]).file.u.shape[-1] == lon.size

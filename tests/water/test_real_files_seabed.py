@@ -78,7 +78,7 @@ def test_a_user_says_what_zeros_are(tmp_path):
     path = written(tmp_path, both(dataset(), lambda one: one.where(one.depth < 40.0, 0.0)))
     assert water(path, 20.5, 60.5, 80.0) is None
     assert water(path, 20.5, 60.5, 80.0, {"zeros": "calm"}) == pytest.approx((0.0, 0.0))
-    assert any('name `zeros` = "calm"' in note for note in read_currents(path).notes)
+    assert any('set `zeros` = "calm"' in note for note in read_currents(path).notes)
     with pytest.raises(InputError, match='`zeros` must be "land" or "calm"; got \'sea\''):
         read_currents(path, {"zeros": "sea"})
 
@@ -208,7 +208,9 @@ def test_some_sigma_levels_are_no_whole_column(tmp_path):
     assert water(path, 20.5, 60.5, 0.0) == pytest.approx(current(20.5, 60.5, at[0]), abs=1e-3)
     assert water(path, 20.5, 60.5, 100.0) is None
     path, _ = sigma_file(tmp_path, slice(9, 10))
-    with pytest.raises(InputError, match=r"one terrain-following level, at s = -0.525, amid the water"):
+    with pytest.raises(
+        InputError, match=r"one terrain-following level, at s = -0.525, far from surface and seabed"
+    ):
         read_currents(path)
 
 

@@ -76,10 +76,10 @@ def test_charts_in_many_ways(tmp_path, way):
 @pytest.mark.parametrize(
     ("make", "names", "words"),
     [
-        (lambda: chart("bottom"), {}, "can be told by its name; name `variable`, of: bottom"),
-        (lambda: chart("bottom"), {"variable": "bottom"}, "up or down: name `positive`"),
-        (lambda: chart("elevation", -1.0) * 0 + 5, {}, "nowhere below 0, so there is no sea"),
-        (lambda: chart("deptho", 1.0) * 0 - 5, {}, "is a depth, yet never above 0"),
+        (lambda: chart("bottom"), {}, "no bathymetry with a known name; set `variable` to one of: bottom"),
+        (lambda: chart("bottom"), {"variable": "bottom"}, "up or down: set `positive`"),
+        (lambda: chart("elevation", -1.0) * 0 + 5, {}, "is never below 0, so there is no sea"),
+        (lambda: chart("deptho", 1.0) * 0 - 5, {}, "is a depth, but it is never above 0"),
         (lambda: xr.merge([chart("z"), chart("topo")]), {}, "2 bathymetries, z, topo"),
         (lambda: chart(units="fathoms"), {}, "fathoms"),
         (lambda: chart().isel(lon=slice(0, 50)), {}, "lies partly outside chart.nc"),
@@ -169,14 +169,14 @@ def test_polygons_across_the_date_line_and_holes(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{", "is no GeoJSON"),
-        ("[1]", "is no GeoJSON"),
-        ('{"type": "Polygon"}', "is no GeoJSON"),
+        ("{", "is not a GeoJSON"),
+        ("[1]", "is not a GeoJSON"),
+        ('{"type": "Polygon"}', "is not a GeoJSON"),
         ('{"type": "FeatureCollection", "features": []}', "holds no polygon"),
         ('{"type": "Point", "coordinates": [1, 2]}', "holds a Point"),
         ('{"type": "Polygon", "coordinates": [[[1000, 2], [1001, 2], [1001, 3], [1000, 2]]]}', "not in degrees"),
         ('{"type": "Polygon", "coordinates": []}', "empty"),
-        ("[" * 100_000, "is no GeoJSON"),
+        ("[" * 100_000, "is not a GeoJSON"),
     ],
 )
 def test_polygons_that_are_none(tmp_path, text, words):
@@ -244,6 +244,7 @@ def ways_of_all_legs(problem, road, spacing=10.0):
     return np.concatenate(rows)
 
 
+@pytest.mark.slow
 def test_no_leg_touches_what_the_files_close(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written(tmp_path, chart())

@@ -1,1 +1,1 @@
-"""A vehicle's own values, out of its own dives."""
+"""Calibration: the values of a vehicle from its own dives."""

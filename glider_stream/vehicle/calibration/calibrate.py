@@ -1,8 +1,8 @@
-"""Calibration: the buoyancy, drag and lift of a vehicle, as far as dives that it flew determine them.
+"""Calibration: finds a vehicle's buoyancy, drag and lift as far as its dives determine them.
 
-Where each dive tells two numbers, speed and glide angle, all forces may be multiplied by one number and nothing
-recorded changes: of net mass and drag only the ratio shows, and of lift and induced drag only c / a^2. What does
-not show is held at the preset's value, and said.
+If a dive gives only speed and glide angle, all forces may be multiplied by one number and no record changes. Then
+only the ratio of net mass to drag is known, and of lift and induced drag only c / a^2. Values that are not
+determined keep the preset's value, and the result lists them.
 """
 
 import math
@@ -26,27 +26,28 @@ KEYS: dict[type[Glider], tuple[str, str, str]] = {
     Seaglider: ("drag", "induced_drag", "lift"),
     SteadyGlide: ("drag_0", "drag_alpha2", "lift_alpha"),
 }
-"""By model: the keys of parasite drag, induced drag and lift."""
+"""The keys of parasite drag, induced drag and lift of each model."""
 INSTRUMENTS = ("vertical", "horizontal", "glide_angle", "pitch")
 DETERMINED = 0.25
-"""A coefficient whose relative standard error is larger is not determined, and keeps the preset's value."""
+"""A coefficient with a larger relative standard error is not determined and keeps the preset's value."""
 OUTLYING = 3.0
-"""Scatters away from the fit that make a dive worth a look."""
+"""A dive this many scatters away from the fit is listed as outlying."""
 FLAT = 0.1
-"""The share of dives that may be too flat for a vehicle by the scatter of their angles."""
+"""This share of the dives may be too flat for the vehicle, because their angles scatter."""
 FEWEST = 3
 
 
 def calibrate(dives: Dives, preset: str = "seaglider") -> Calibration:
-    """Fit a preset to dives by least squares of their distance from what the vehicle's instruments would record.
+    """Fit a preset to dives by least squares of the distances to the values that the vehicle would record.
 
-    With the buoyancy of each dive the parasite drag is fitted; without, the buoyancy is, of each phase where
-    phases are told. The lift needs a pitch beside the glide angle. It and the induced drag are held where the
-    dives do not determine them. Standard errors come from the Jacobian and the scatter of the residuals.
+    If each dive has a buoyancy, the parasite drag is fitted; otherwise the buoyancy is fitted, for each phase if
+    the phases are known. The lift needs a pitch in addition to the glide angle. Lift and induced drag keep the
+    preset's values if the dives do not determine them. Standard errors come from the Jacobian and the scatter of
+    the residuals.
     """
     require(preset in VEHICLES, f"`preset` = {preset!r} cannot be calibrated; choose from: {', '.join(VEHICLES)}")
     base, count = PRESETS[preset], dives.vertical.size
-    require(count >= FEWEST, f"a calibration needs {FEWEST} dives or more; got {count}: add some")
+    require(count >= FEWEST, f"a calibration needs at least {FEWEST} dives; got {count}: add some")
     drag, induced, lift = KEYS[type(base)]
     problem = _problem(dives, base)
     main = tuple(problem.groups) or (drag,)
@@ -57,11 +58,11 @@ def calibrate(dives: Dives, preset: str = "seaglider") -> Calibration:
     if angled:
         loose.append(induced)
     else:
-        held[induced] = "a pitch alone does not tell it from the lift"
+        held[induced] = "a pitch alone does not separate it from the lift"
     if angled and dives.pitch is not None:
         loose.append(lift)
     else:
-        held[lift] = f"without a pitch beside the glide angle only {induced} / {lift}^2 shows"
+        held[lift] = f"without a pitch in addition to the glide angle only {induced} / {lift}^2 is determined"
     first = problem.fit(main, {})
     start = dict(zip(main, first.logs, strict=True))
     while True:
@@ -77,12 +78,15 @@ def calibrate(dives: Dives, preset: str = "seaglider") -> Calibration:
         held[vague[0]] = vague[1]
     for n, name in enumerate(main):
         wrong = f"no {name} within a factor of {math.exp(FURTHEST_MAIN):.0f} of the preset's fits"
-        require(not fit.bound[n], f"{wrong} {', '.join(dives.took.values())}; look at their units")
+        require(not fit.bound[n], f"{wrong} {', '.join(dives.took.values())}; check their units")
     return _calibration(problem, preset, fit, held)
 
 
 def _vague(problem: FitProblem, fit: Fit, first: Fit) -> tuple[str, str] | None:
-    """The coefficient that the dives determine worst, and why it does not do; `first`: the fit without any."""
+    """Return the coefficient that is determined worst, and the reason to hold it; None if all are good enough.
+
+    `first`: the fit without any of these coefficients.
+    """
     loose = [n for n in range(len(fit.names)) if fit.names[n] not in first.names]
     if not loose:
         return None
@@ -90,19 +94,19 @@ def _vague(problem: FitProblem, fit: Fit, first: Fit) -> tuple[str, str] | None:
     name, error = fit.names[worst], float(fit.errors[worst])
     flat = [np.mean(problem.flat(found)) for found in (fit, first)]
     if fit.bound[worst]:
-        return name, "these dives fit best with one that no vehicle has, so they do not determine it"
+        return name, "these dives fit best with a value that no vehicle has, so they do not determine it"
     if flat[0] > flat[1] + FLAT:
-        return name, "these dives fit best with one that could not have flown some of them"
+        return name, "these dives fit best with a value with which some of them cannot be flown"
     if not error <= DETERMINED:
-        return name, f"these dives determine it to {min(error, 99.0):.0%} only"
+        return name, f"these dives determine it only to {min(error, 99.0):.0%}"
     return None
 
 
 def _held(drag: str, base: Glider) -> dict[str, str]:
-    """What is held whatever the dives are, and why."""
+    """Return the values that are held for any dives, and why."""
     shape = "drag_exponent" if isinstance(base, Seaglider) else "lift_0"
     why = "the published model's shape" if isinstance(base, Seaglider) else "the vehicle is symmetrical"
-    return {drag: "without a recorded buoyancy only its ratio to the buoyancy shows", shape: why}
+    return {drag: "without a recorded buoyancy only its ratio to the buoyancy is determined", shape: why}
 
 
 def _problem(dives: Dives, base: Glider) -> FitProblem:
@@ -118,14 +122,14 @@ def _problem(dives: Dives, base: Glider) -> FitProblem:
 
 
 def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str]) -> Calibration:
-    """The vehicle that a fit found, and how far the dives are from it at the angles that they were flown at."""
+    """Return the fitted vehicle and its errors at the angles of the dives."""
     from scipy.special import stdtrit
 
     dives, base, count, fitted = problem.dives, problem.base, problem.dives.vertical.size, len(fit.names)
     ratio = dict(zip(fit.names, np.exp(fit.logs), strict=True))
     parameters = {}
     for name, error in zip(fit.names, fit.errors, strict=True):
-        before = problem.own if name in problem.groups else float(getattr(base, name))
+        before = problem.volume if name in problem.groups else float(getattr(base, name))
         value = before * float(ratio[name])
         parameters[name] = Parameter(value, value * float(error), before, "cc" if name in problem.groups else "")
     flown = problem.flown(fit.names, fit.logs)
@@ -135,7 +139,7 @@ def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str
     if dives.horizontal is not None:
         horizontal = flown.speed(angle) * np.cos(angle) - dives.horizontal
     elif dives.glide_angle is not None:
-        # the horizontal speed that vertical speed and glide angle tell
+        # the horizontal speed from vertical speed and glide angle
         horizontal = vertical / np.tan(angle)
     wide = float(stdtrit(max(count - fitted, 1), 0.5 + CONFIDENCE / 2)) * math.sqrt(1 + fitted / count)
     off = np.abs(vertical if horizontal is None else np.hypot(vertical, horizontal))
@@ -159,14 +163,14 @@ def _calibration(problem: FitProblem, preset: str, fit: Fit, held: dict[str, str
 
 
 def _volumes(dives: Dives, volumes: Array) -> tuple[float, float]:
-    """The mean off neutral in a dive and in a climb [cc]; the other's where one of them is not flown."""
+    """Return the mean volume [cc] off neutral in dives and in climbs; a phase without dives gets the other's."""
     phases = [volumes] * 2 if dives.down is None else [volumes[dives.down], volumes[~dives.down]]
     dive, climb = (float((phase if phase.size else volumes).mean()) for phase in phases)
     return dive, climb
 
 
 def _ranged(glider: Glider, base: Glider, angle: Array) -> Glider:
-    """The glider over the preset's range and the flown angles [degrees], as far as the kernels can take them."""
+    """Return the glider for the preset's range and the flown angles [degrees], as far as the kernels allow."""
     limit = math.degrees(max(map(abs, glider.limits)))
     high = max(base.angles[1], math.ceil(float(angle.max())))
     low = max(min(base.angles[0], math.floor(float(angle.min()))), math.ceil(limit + 0.5))
@@ -176,5 +180,5 @@ def _ranged(glider: Glider, base: Glider, angle: Array) -> Glider:
             polar(ranged)
             return ranged
         except InputError:
-            # near its limit a vehicle may sink faster on a flatter path
+            # near the limit a vehicle may sink faster on a flatter path
             low += 1

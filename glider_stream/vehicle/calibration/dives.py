@@ -1,4 +1,4 @@
-"""Recorded dives, out of a CSV file."""
+"""Recorded dives from a CSV file."""
 
 import csv
 from collections import Counter
@@ -38,23 +38,24 @@ COLUMNS = {
     "net_mass": ("net_mass", "net_mass_kg", "buoyancy_kg"),
     "phase": ("phase",),
 }
-"""What a column may be called: speeds through water [m/s], angles [degrees], what is off neutral [cc] or [kg]."""
+"""The names of columns: speeds through water [m/s], angles [degrees], buoyancy off neutral [cc] or [kg]."""
 MOST_TEXT, MOST_DIVES = 20_000_000, 5_000
 LARGEST = 1e6
 LIMITS = {
     **{"vertical": (-10.0, 10.0), "horizontal": (0.0, 10.0)},
     **{"pitch": (-90.0, 90.0), "glide_angle": (-90.0, 90.0)},
 }
-"""Between which a recorded value lies, [m/s] and [degrees]: no glider is ever as fast."""
+"""The limits of recorded values, [m/s] and [degrees]: no glider is faster."""
 PHASES = {"dive": True, "down": True, "climb": False, "up": False}
 
 
 @dataclass(frozen=True)
 class Dives:
-    """Steady glides (n,), as magnitudes, None where the file does not tell: `vertical`, `horizontal` speed [m/s].
+    """Steady glides (n,), as magnitudes; None if the file does not hold a value.
 
-    `glide_angle`, `pitch` [rad]; `buoyancy`, off neutral, in its `unit`, cc or kg; `down`: a dive and no climb;
-    `line` of the file (n,); `took`: the column that was taken for what; `unused` columns.
+    `vertical`, `horizontal` speed [m/s]; `glide_angle`, `pitch` [rad]; `buoyancy` off neutral in its `unit`, cc
+    or kg; `down`: true for a dive, false for a climb; `line` of the file (n,); `took`: which column was taken for
+    what; `unused` columns.
     """
 
     vertical: Array
@@ -70,23 +71,24 @@ class Dives:
 
 
 def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Dives:
-    """Dives out of a CSV file with a header; `columns` names those that are called otherwise.
+    """Return the dives of a CSV file with a header; `columns` names columns that have other names.
 
-    A vertical speed is needed, and the horizontal one, a glide angle or a pitch. Dives are told from climbs by
-    a column of phases, or by the signs of pitch, glide angle or vertical speed, below 0 in a dive. InputError
-    where the file lacks what a fit needs, and where a value is not a number or has the sign of the other phase.
+    A vertical speed is needed, and a horizontal speed, a glide angle or a pitch. Dives and climbs are separated
+    by a column of phases, or by the signs of pitch, glide angle or vertical speed, which are below 0 in a dive.
+    InputError if the file lacks a column that a fit needs, or if a value is not a number or has the sign of the
+    other phase.
     """
     path = Path(file)
     header, rows = _table(path)
     found = _found(path.name, header, columns or {})
     listed = f"; it has: {', '.join(header)}"
-    require("vertical" in found, f"{path.name} has no column of vertical speeds, name it by `vertical`{listed}")
-    told = {"horizontal", "pitch", "glide_angle"} & set(found)
-    require(bool(told), f"{path.name} must have a horizontal speed, a pitch or a glide angle, name one{listed}")
+    require("vertical" in found, f"{path.name} has no column of vertical speeds; name it by `vertical`{listed}")
+    given = {"horizontal", "pitch", "glide_angle"} & set(found)
+    require(bool(given), f"{path.name} must have a horizontal speed, a pitch or a glide angle; name one{listed}")
     twice = "buoyancy" in found and "net_mass" in found
     require(not twice, f"{path.name} has a buoyancy in cc and one in kg; leave one out{listed}")
     if "horizontal" in found:
-        # the two speeds are the glide angle
+        # the two speeds give the glide angle
         found.pop("glide_angle", None)
     line = np.array([number for number, _ in rows], np.int64)
     at = {column: n for n, column in enumerate(header)}
@@ -105,9 +107,9 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
                 down = values[what] < 0
                 found["phase"] = f"{found[what]}, below 0 in a dive"
                 break
-    for what, one in values.items():
-        _check_signs(path.name, line, one, None if what == "horizontal" else down, found[what])
-        values[what] = np.abs(one)
+    for what, speeds in values.items():
+        _check_signs(path.name, line, speeds, None if what == "horizontal" else down, found[what])
+        values[what] = np.abs(speeds)
     for what in ("pitch", "glide_angle"):
         if what in values:
             values[what] = np.radians(values[what])
@@ -126,14 +128,14 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
 
 
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The header, and the rows with the lines that they stand on."""
+    """Return the header and the rows with their line numbers."""
     require(path.is_file(), f"the file of dives {path} does not exist; give a CSV file")
     size = path.stat().st_size
     require(size <= MOST_TEXT, f"{path.name} holds {size:,} bytes, more than {MOST_TEXT:,}; cut it")
     try:
         with path.open(encoding="utf-8-sig", newline="") as text:
             first = text.readline()
-            # spreadsheets of some countries write semicolons
+            # spreadsheets in some countries write semicolons
             delimiter = max(",;\t", key=first.count)
             text.seek(0)
             reader = csv.reader(text, delimiter=delimiter)
@@ -141,7 +143,7 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
             rows = list(_rows(reader, path.name, len(header)))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path.name} cannot be read as CSV: {error}; save it as such") from None
-    require(len(rows) > 0, f"{path.name} must hold a header and dives, a line each; got none")
+    require(len(rows) > 0, f"{path.name} must hold a header and one line for each dive; got no line")
     for name, times in Counter(header).items():
         require(times == 1, f"{path.name} has more than one column `{name}`; rename one")
     return header, rows
@@ -154,23 +156,23 @@ def _rows(reader: Iterator[list[str]], name: str, width: int) -> Iterator[tuple[
             continue
         line = getattr(reader, "line_num", 0)
         fits = len(row) == width
-        require(fits, f"line {line} of {name} has {len(row)} cells, and the header {width}; mend it")
+        require(fits, f"line {line} of {name} has {len(row)} cells, but the header has {width}; mend it")
         count += 1
         require(count <= MOST_DIVES, f"{name} must hold at most {MOST_DIVES:,} dives; got more: cut it")
         yield line, row
 
 
-def _found(name: str, header: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
-    """The column for each of COLUMNS that there is."""
-    for what, column in said.items():
+def _found(name: str, header: Sequence[str], columns: Mapping[str, str]) -> dict[str, str]:
+    """Return the column in the file for each entry of COLUMNS that it has."""
+    for what, column in columns.items():
         require(what in COLUMNS, f"`{what}` is not known; choose from: {', '.join(COLUMNS)}")
         require(column in header, f"{name} has no column `{column}`; it has: {', '.join(header)}")
-    found = dict(said)
+    found = dict(columns)
     for what, usual in COLUMNS.items():
-        here = [column for column in header if column.lower() in usual and column not in said.values()]
+        here = [column for column in header if column.lower() in usual and column not in columns.values()]
         if what not in found and here:
-            one = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
-            require(len(here) == 1, one)
+            message = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
+            require(len(here) == 1, message)
             found[what] = here[0]
     return found
 
@@ -202,7 +204,11 @@ def _phases(name: str, line: NDArray[np.int64], cells: Sequence[str], column: st
 def _check_signs(
     name: str, line: NDArray[np.int64], values: Array, down: NDArray[np.bool_] | None, column: str
 ) -> None:
-    """Magnitudes or signed: either way a phase has one sign, and what has the other is a mistake, not a glide."""
+    """Raise InputError if a value has the sign of the other phase.
+
+    Values may be magnitudes or signed. In both cases a phase has one sign; a value with the other sign is a
+    mistake.
+    """
     for part in [np.full(values.size, True)] if down is None else [down, ~down]:
         odd = part & (np.sign(values) != np.sign(values[part][:1].sum()))
         if odd.any():

@@ -1,4 +1,4 @@
-"""Fits: values of a vehicle by least squares, and their standard errors."""
+"""Fits: values of a vehicle by least squares, with their standard errors."""
 
 import math
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from .dives import Dives
 from .instruments import Flown, distances
 
 SPEED_ERROR, ANGLE_ERROR = 0.01, math.radians(1.0)
-"""The assumed errors of a recorded speed [m/s] and angle [rad], where the dives do not show their ratio."""
+"""The assumed errors of a recorded speed [m/s] and angle [rad], if the dives do not show their ratio."""
 FINEST = 0.01
 """The smallest scatter that is assumed, as a share of these errors."""
 REWEIGHTED = 10
-"""The weights of the instruments are computed again at most so many times."""
+"""The weights of the instruments are computed again at most this many times."""
 STEP = 1e-5
 """The step of a logarithm for the Jacobian: far above the precision of the models."""
 CLOSE = 1e-7
@@ -28,7 +28,7 @@ FURTHEST = {"induced_drag": 3.0, "drag_alpha2": 3.0, "lift": 1.5, "lift_alpha": 
 
 @dataclass(frozen=True)
 class Fit:
-    """Logarithms of values over the preset's, their standard errors; whether one stands at its bound."""
+    """The result: logarithms of values over the preset's, standard errors, and which are at their bound."""
 
     names: tuple[str, ...]
     logs: Array
@@ -38,41 +38,42 @@ class Fit:
 
 @dataclass(frozen=True)
 class FitProblem:
-    """What is fitted: `dives`, and the preset with its `own` volume off neutral [cc].
+    """The problem of a fit: `dives`, and the preset with its `volume` off neutral [cc].
 
-    `kinds` of instruments; `groups` (n,) of dives that share a volume to be found, or the `recorded` ones (n,).
+    `kinds`: the instruments. `groups` (n,): dives that share an unknown volume; or `recorded` (n,): the volumes
+    [cc] of the dives.
     """
 
     dives: Dives
     base: Glider
-    own: float
+    volume: float
     kinds: tuple[str, ...]
     groups: dict[str, NDArray[np.bool_]]
     recorded: Array | None
 
     def flown(self, names: tuple[str, ...], logs: Array) -> Flown:
-        """The vehicle with fitted values."""
+        """Return the records of the vehicle with fitted values."""
         ratio = dict(zip(names, np.exp(logs), strict=True))
-        volumes = np.full(self.dives.vertical.size, self.own) if self.recorded is None else self.recorded
+        volumes = np.full(self.dives.vertical.size, self.volume) if self.recorded is None else self.recorded
         for name, group in self.groups.items():
-            volumes = np.where(group, self.own * ratio[name], volumes)
+            volumes = np.where(group, self.volume * ratio[name], volumes)
         return Flown(self.base, self.values(ratio), volumes)
 
     def flat(self, fit: Fit) -> NDArray[np.bool_]:
-        """Which dives (n,) are flatter than a fitted vehicle can glide."""
+        """Return which dives (n,) are flatter than the fitted vehicle can glide."""
         flown = self.flown(fit.names, fit.logs)
         return np.asarray(flown.angle(self.dives) <= flown.flattest)
 
     def values(self, ratio: dict[str, float]) -> dict[str, float]:
-        """Coefficients of the model, of ratios to the preset's."""
+        """Return coefficients of the model from their ratios to the preset's."""
         return {name: getattr(self.base, name) * float(x) for name, x in ratio.items() if name not in self.groups}
 
     def fit(self, names: tuple[str, ...], start: dict[str, float]) -> Fit:
-        """Plain least squares of the distances, in what instruments may err by.
+        """Return the least-squares fit of the distances, in units of the instruments' errors.
 
-        Speeds and angles are weighed by their own scatter where a dive has three records (Förstner 1979): two
-        do not tell which of them erred. From `start`, logarithms by name: begun where fewer values fit best,
-        a fit is never worse for having more.
+        If a dive has three records, speeds and angles are weighted by their own scatter (Förstner 1979); two
+        records do not show which of them is wrong. The fit starts at `start`, logarithms by name. If it starts at
+        the best fit of fewer values, it is never worse for having more.
         """
         from scipy.optimize import least_squares
 
@@ -92,7 +93,7 @@ class FitProblem:
             )
             logs, jac = np.asarray(found.x), np.asarray(found.jac)
             off, tangent = distances(self.flown(names, logs), self.kinds, self.dives, scale)
-            # what is left of each residual when the dive's angle and the parameters are taken from it
+            # the part of each residual that remains after the dive's angle and the parameters are fitted
             left = 1 - tangent**2 / (tangent**2).sum(axis=1, keepdims=True)
             left -= (np.linalg.qr(jac)[0] ** 2).sum(axis=1).reshape(off.shape)
             before = scale.copy()

@@ -1,4 +1,4 @@
-"""Currents out of ocean files, from whatever convention into what the kernels read."""
+"""Reads ocean files of any convention and makes the currents that the kernels read."""
 
 from .divergence import divergence_ratio
 from .file import OceanFile, parse_time

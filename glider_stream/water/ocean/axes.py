@@ -1,4 +1,4 @@
-"""Axes of ocean files: degrees, depths and times, as they should be."""
+"""Axes of ocean files: checks degrees and depths and brings them into one form."""
 
 from typing import Any
 
@@ -14,11 +14,11 @@ from .names import WORDS, Names, standard_name, units_of
 from .units import in_metres
 
 MOST_POINTS = 100_000_000
-"""Places of a curved grid that are looked at."""
+"""A grid may have at most this many points."""
 
 
 def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
-    """The axis rising, each longitude once, and which values of the file it is made of."""
+    """Return a rising axis with each longitude once, and the indices of its values in the file."""
     broken = f"the {WORDS[kind]} `{variable.name}` in {name}"
     require(variable.size <= MOST_POINTS, f"{broken} claims {variable.size:,} points; cut the file")
     axis = np.asarray(variable.values, dtype=np.float64).ravel()
@@ -37,57 +37,58 @@ def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
 
 
 def _once_around(axis: Array, order: Index) -> tuple[Array, Index]:
-    """Longitudes that rise from the first, without those that repeat the first; the widest gap is the seam."""
+    """Return longitudes that rise, without repeated values, and their indices; the seam is at the widest gap."""
     if axis.size < 3:
         return axis[0] + (axis - axis[0]) % 360, order
-    # a raw axis that rises throughout may span more than the circle; any other is read modulo 360
+    # an axis that rises from end to end may span more than the circle; any other is read modulo 360
     rises = bool((np.diff(axis) > 0).all())
     axis = axis if rises else axis[0] + (axis - axis[0]) % 360
-    # a cyclic point rounds to either side of the full circle
+    # a repeated first point may round to either side of the full circle
     slack = 1e-3 * abs(axis[1] - axis[0])
     before = np.concatenate([[-np.inf], np.maximum.accumulate(axis)[:-1]])
     kept = (axis > before) & (axis < axis[0] + 360 - slack)
     away = np.abs((axis[~kept][:, None] - axis[kept] + 180) % 360 - 180).min(axis=1, initial=360.0)
     if (away > 0.01 * abs(axis[1] - axis[0])).any():
-        # values that repeat no other: the caller sees that the axis does not rise
+        # these values repeat no other value: the caller will find that the axis does not rise
         return axis, order
     axis, order = axis[kept], order[kept]
     steps = np.diff(axis)
     widest = int(steps.argmax()) if steps.size else 0
     if gaps(axis).any() and steps[widest] > axis[0] + 360 - axis[-1]:
-        # a part about the date line that was sorted from -180 to 180
+        # a region about the date line whose longitudes were sorted from -180 to 180
         order = np.roll(order, -(widest + 1))
         axis = np.concatenate([axis[widest + 1 :], axis[: widest + 1] + 360])
     return axis, order
 
 
 def places(name: str, lon: Any, lat: Any) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Longitude and latitude (ny, nx) of every point, and where the file has none of its own.
+    """Return longitude and latitude (ny, nx) of every point, and where the file gives no position.
 
-    Models that drop tiles of land leave zeros or fills there: such points get places that continue those
-    around, so that a grid stays a grid.
+    Models that leave out tiles of land write zeros or fill values there. Such points get positions that continue
+    those around them, so that the grid stays regular.
     """
     size = lon.size
     require(size <= MOST_POINTS, f"the longitude `{lon.name}` in {name} claims {size:,} points; cut the file")
-    at_lon, at_lat = (np.array(one.values, dtype=np.float64) for one in (lon, lat))
+    at_lon, at_lat = (np.array(variable.values, dtype=np.float64) for variable in (lon, lat))
     if str(lon.attrs.get("units", "")).strip().lower() in ("radian", "radians", "rad"):
         at_lon, at_lat = np.degrees(at_lon), np.degrees(at_lat)
-    none = ~(np.isfinite(at_lon) & np.isfinite(at_lat)) | (np.abs(at_lat) > 90.001) | (np.abs(at_lon) > 1080)
+    missing = ~(np.isfinite(at_lon) & np.isfinite(at_lat)) | (np.abs(at_lat) > 90.001) | (np.abs(at_lon) > 1080)
     still = (at_lon == 0) & (at_lat == 0)
-    none |= still if still.sum() > 1 else False
+    missing |= still if still.sum() > 1 else False
     require(
-        float(none.mean()) < 0.9,
-        f"the places `{lon.name}` and `{lat.name}` in {name} are missing, or no degrees, nearly everywhere",
+        float(missing.mean()) < 0.9,
+        f"the places `{lon.name}` and `{lat.name}` in {name} are missing, or are not degrees, nearly everywhere; "
+        "name other `lon` and `lat` in `names`",
     )
-    if none.any():
-        middle = float(at_lon[~none][0])
-        at_lon = _continued(np.where(none, np.nan, wrapped(at_lon, middle)))
-        at_lat = np.clip(_continued(np.where(none, np.nan, at_lat)), -90, 90)
-    return at_lon, at_lat, none
+    if missing.any():
+        middle = float(at_lon[~missing][0])
+        at_lon = _continued(np.where(missing, np.nan, wrapped(at_lon, middle)))
+        at_lat = np.clip(_continued(np.where(missing, np.nan, at_lat)), -90, 90)
+    return at_lon, at_lat, missing
 
 
 def _continued(values: Array) -> Array:
-    """NaN replaced along rows, then along columns: straight between known values and beyond them."""
+    """Replace NaN along rows, then along columns, by straight lines between known values and beyond them."""
     for axis in (1, 0):
         values = np.moveaxis(values, axis, -1)
         for row in values:
@@ -105,8 +106,8 @@ def _continued(values: Array) -> Array:
     return values
 
 
-def depths(name: str, variable: Any, said: Names) -> tuple[Array, Index, float, str]:
-    """Depths downward, rising; which values of the file they are; metres of its unit; what was taken for what."""
+def depths(name: str, variable: Any, names: Names) -> tuple[Array, Index, float, str]:
+    """Return rising depths [m, downward], their indices in the file, the metres in its unit, and a text."""
     axis = np.atleast_1d(np.asarray(variable.values, dtype=np.float64)).ravel()
     broken = f"the depth `{variable.name}` in {name}"
     require(bool(np.isfinite(axis).all()), f"{broken} has missing values")
@@ -119,15 +120,15 @@ def depths(name: str, variable: Any, said: Names) -> tuple[Array, Index, float, 
         below or above,
         f"{broken} runs from {axis.min():g} to {axis.max():g}, on both sides of the surface",
     )
-    claim = said.positive or str(variable.attrs.get("positive", "")).strip().lower()
+    claim = names.positive or str(variable.attrs.get("positive", "")).strip().lower()
     if claim not in ("up", "down"):
         claim = "up" if standard_name(variable).startswith(("height", "altitude")) else ""
     sense = "up" if not above else "down" if not below else claim or "down"
-    # heights above the seabed look so, too: the sign alone must not decide
+    # heights above the seabed have the same signs, so the sign alone must not decide
     require(
         claim in ("", sense),
-        f"{broken} is said to be positive {claim}, but runs from {axis[0]:g} to {axis[-1]:g}: "
-        f'if these are depths under the surface, name `positive` = "{sense}" in `names`',
+        f"{broken} is declared positive {claim}, but runs from {axis[0]:g} to {axis[-1]:g}: "
+        f'if these are depths under the surface, set `positive` = "{sense}" in `names`',
     )
     axis, order = np.abs(axis) * factor, np.arange(axis.size)
     if axis.size > 1 and bool(axis[0] > axis[-1]):

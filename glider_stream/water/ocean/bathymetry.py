@@ -1,4 +1,4 @@
-"""Bathymetry files: the height of the bottom, from GEBCO, ETOPO, a model's depths, or a chart of your own."""
+"""Bathymetry files: the height of the bottom, from GEBCO, ETOPO, a model's depths, or your own chart."""
 
 import math
 import re
@@ -30,16 +30,16 @@ DOWN_NAMES = re.compile(r"sea_floor_depth|^sea_floor_depth_below|depth_below_(ge
 UP_SHORT = {"elevation", "topo", "z", "altitude", "band1", "height", "elev", "bedrock", "rose"}
 DOWN_SHORT = {"deptho", "h", "bathymetry", "bathy", "depth", "bathy_metry", "ht", "hu", "bottom_depth", "topog"}
 HEIGHT_WORDS = re.compile(r"\b(elevation|height|altitude|topography)\b")
-"""Long names of what counts upward."""
+"""Long names that contain one of these words are heights, which count upward."""
 LIMIT = 500_000_000
-"""The most that the heights of a domain may take in memory [bytes]."""
+"""The heights of a domain may take at most this much memory [bytes]."""
 CHART_BEYOND = 3
-"""Cells of a chart kept around a domain."""
+"""This many cells of a chart are kept around a domain."""
 
 
 @dataclass(frozen=True)
 class Chart:
-    """What the user says of a bathymetry: its `variable`, whether it counts "up" or "down", and other `names`."""
+    """Settings for a bathymetry: its `variable`, whether it counts "up" or "down", and other `names`."""
 
     variable: str | None = None
     positive: str | None = None
@@ -51,7 +51,7 @@ class Chart:
         fits = {"lon", "lat", "units", "positive", "group"}
         alien = [key for key, value in vars(self.names).items() if value is not None and key not in fits]
         require(
-            not alien, f"`terrain.names` knows {', '.join(sorted(fits))}; got {', '.join(alien)}: leave it out"
+            not alien, f"`terrain.names` may hold {', '.join(sorted(fits))}; got {', '.join(alien)}: leave it out"
         )
 
 
@@ -65,15 +65,15 @@ def read_bathymetry(
     positive: str | None = None,
     names: Names | None = None,
 ) -> Bottom:
-    """The bottom in a domain [degrees], and as far `beyond` it [m] as the file goes.
+    """Return the bottom in a domain [degrees] and up to `beyond` [m] around it, as far as the file goes.
 
-    InputError where it does not hold the domain. `variable`, `positive` ("up", "down") and `names` (lon, lat,
-    units, group) where the file does not speak for itself. No data is land.
+    InputError if the file does not cover the domain. `variable`, `positive` ("up", "down") and `names` (lon, lat,
+    units, group) are needed where the file does not give them. Points without data are land.
     """
-    path, said = Path(file), names or Names()
-    asked = Chart(variable, positive or said.positive, said)
-    with opened(path, said.group) as data:
-        for key, name in said.variables().items():
+    path, given = Path(file), names or Names()
+    asked = Chart(variable, positive or given.positive, given)
+    with opened(path, given.group) as data:
+        for key, name in given.variables().items():
             require(
                 name in data.variables,
                 f"{path.name} holds no variable `{name}`, which `{key}` names; "
@@ -89,97 +89,104 @@ def _pick(name: str, data: Any, variable: str | None) -> Any:
             f"{name} holds no variable `{variable}`; it holds: {listing(data.variables)}",
         )
         return data[variable]
-    fields = [one for one in data.data_vars.values() if one.squeeze().ndim == 2 and one.dtype.kind in "fiu"]
-    fields += [one for one in data.coords.values() if one.squeeze().ndim == 2 and one.dtype.kind in "fiu"]
+    fields = [
+        field for field in data.data_vars.values() if field.squeeze().ndim == 2 and field.dtype.kind in "fiu"
+    ]
+    fields += [field for field in data.coords.values() if field.squeeze().ndim == 2 and field.dtype.kind in "fiu"]
     for known in (
-        lambda one: UP_NAMES.search(standard_name(one)) or DOWN_NAMES.search(standard_name(one)),
-        lambda one: str(one.name).lower() in UP_SHORT | DOWN_SHORT,
+        lambda field: UP_NAMES.search(standard_name(field)) or DOWN_NAMES.search(standard_name(field)),
+        lambda field: str(field.name).lower() in UP_SHORT | DOWN_SHORT,
     ):
-        hits = [one for one in fields if known(one)]
+        hits = [field for field in fields if known(field)]
         if len(hits) == 1:
             return hits[0]
         require(
             not hits,
-            f"{name} holds {len(hits)} bathymetries, {listing(one.name for one in hits)}: name `variable`",
+            f"{name} holds {len(hits)} bathymetries, {listing(field.name for field in hits)}: set `variable`",
         )
     raise InputError(
-        f"{name} holds no bathymetry that can be told by its name; name `variable`, of: {listing(data.data_vars)}"
+        f"{name} holds no bathymetry with a known name; set `variable` to one of: {listing(data.data_vars)}"
     )
 
 
-def _sense(name: str, one: Any, values: Array, positive: str | None) -> str:
-    """Whether the values count up or down: the user's word, then the file's, which the sea must not belie."""
-    said = positive or str(one.attrs.get("positive", "")).strip().lower()
-    if said not in ("up", "down"):
-        standard, short = standard_name(one), str(one.name).lower()
+def _sense(name: str, variable: Any, values: Array, positive: str | None) -> str:
+    """Return "up" or "down": as the user says, else as the file says; InputError if the values contradict it."""
+    sense = positive or str(variable.attrs.get("positive", "")).strip().lower()
+    if sense not in ("up", "down"):
+        standard, short = standard_name(variable), str(variable.name).lower()
         up = UP_NAMES.search(standard) is not None or (not standard and short in UP_SHORT)
         down = DOWN_NAMES.search(standard) is not None or (not standard and short in DOWN_SHORT)
-        said = "up" if up and not down else "down" if down and not up else ""
-    require(said != "", f"`{one.name}` in {name} does not say whether it counts up or down: name `positive`")
+        sense = "up" if up and not down else "down" if down and not up else ""
+    require(sense != "", f"`{variable.name}` in {name} does not say whether it counts up or down: set `positive`")
     below, above = bool((values < 0).any()), bool((values > 0).any())
-    if positive is None and said == "down" and below and not above:
+    if positive is None and sense == "down" and below and not above:
         raise InputError(
-            f'`{one.name}` in {name} is a depth, yet never above 0: name `positive` = "up" if it counts upward'
+            f'`{variable.name}` in {name} is a depth, but it is never above 0: set `positive` = "up" if it '
+            "counts upward"
         )
-    told = standard_name(one) or str(one.attrs.get("positive", ""))
-    long = str(one.attrs.get("long_name", "")).lower()
-    if positive is None and said == "down" and not told and (below or HEIGHT_WORDS.search(long)):
+    declared = standard_name(variable) or str(variable.attrs.get("positive", ""))
+    long = str(variable.attrs.get("long_name", "")).lower()
+    if positive is None and sense == "down" and not declared and (below or HEIGHT_WORDS.search(long)):
         raise InputError(
-            f"`{one.name}` in {name} may be a depth or a height: by its name it counts down, yet "
+            f"`{variable.name}` in {name} may be a depth or a height: by its name it counts down, but "
             + (
                 f"its long name is {long!r}"
                 if HEIGHT_WORDS.search(long)
                 else f"it runs from {values.min():g} to {values.max():g}"
             )
-            + ': name `positive`, "up" or "down"'
+            + ': set `positive`, "up" or "down"'
         )
-    if positive is None and said == "up" and not below:
+    if positive is None and sense == "up" and not below:
         raise InputError(
-            f"`{one.name}` in {name} is a height, yet nowhere below 0, so there is no sea: name `positive` = "
+            f"`{variable.name}` in {name} is a height, but it is never below 0, so there is no sea: set "
+            "`positive` = "
             '"down" if it counts downward'
         )
-    return said
+    return sense
 
 
-def _places(name: str, data: Any, one: Any, said: Names) -> tuple[tuple[str, str], Grid, Index, Index]:
-    """The dimensions across and along the rows, the grid, and which rows and columns of the file it has."""
-    dims, lon, lat = horizontal_of(Catalogue(name, data, said), one, "u")
+def _places(name: str, data: Any, variable: Any, names: Names) -> tuple[tuple[str, str], Grid, Index, Index]:
+    """Return the dimensions across and along the rows, the grid, and its rows and columns in the file."""
+    dims, lon, lat = horizontal_of(Catalogue(name, data, names), variable, "u")
     if lon.ndim == 1:
         (at_lon, columns), (at_lat, rows) = degrees(name, lon, "lon"), degrees(name, lat, "lat")
-        require(min(at_lon.size, at_lat.size) > 1, f"`{one.name}` in {name} is no grid of two points or more")
+        require(
+            min(at_lon.size, at_lat.size) > 1,
+            f"`{variable.name}` in {name} is not a grid of two points or more in each direction",
+        )
         return dims, grid_of(at_lon, at_lat), rows, columns
     grid = grid_of(*places(name, lon, lat)[:2])
     return dims, grid, np.arange(grid.shape[0]), np.arange(grid.shape[1])
 
 
 def _read(name: str, data: Any, frame: LocalFrame, lon: Range, lat: Range, beyond: float, asked: Chart) -> Bottom:
-    one = _pick(name, data, asked.variable)
-    dims, grid, rows, columns = _places(name, data, one, asked.names)
-    single = {dim: 0 for dim in map(str, one.dims) if dim not in dims}
+    variable = _pick(name, data, asked.variable)
+    dims, grid, rows, columns = _places(name, data, variable, asked.names)
+    single = {dim: 0 for dim in map(str, variable.dims) if dim not in dims}
     require(
-        all(one.sizes[dim] == 1 for dim in single),
-        f"`{one.name}` in {name} has dimensions {', '.join(map(str, one.dims))}: a bathymetry has two",
+        all(variable.sizes[dim] == 1 for dim in single),
+        f"`{variable.name}` in {name} has dimensions {', '.join(map(str, variable.dims))}: a bathymetry has two",
     )
-    units = asked.names.units or units_of(one)
+    units = asked.names.units or units_of(variable)
     factor = in_metres(units)
     if factor is None:
         raise InputError(
-            f"`{one.name}` in {name} is in {units!r}, not in metres: convert it, or name `units` in `names`"
+            f"`{variable.name}` in {name} is in {units!r}, not in metres: convert it, or set `units` in `names`"
         )
     cell = min(float(size.min()) for size in grid.cell_sizes())
     cut = grid.cut(name, lon, lat, frame.lon, CHART_BEYOND + math.ceil(max(beyond, 0.0) / max(cell, 1.0)))
     size = 8 * cut.grid.shape[0] * cut.grid.shape[1]
     require(size <= LIMIT, f"the bottom of {name} would take {size / 1e9:.1f} GB: narrow the domain")
     picked = {dims[0]: rows[cut.rows], dims[1]: columns[cut.columns], **single}
-    values = np.asarray(one.isel(picked).transpose(*dims).values, np.float64) * factor
+    values = np.asarray(variable.isel(picked).transpose(*dims).values, np.float64) * factor
     gone, marks = undeclared(values)
     values = np.where(gone, np.nan, values)
-    said = _sense(name, one, values[np.isfinite(values)], asked.positive)
-    height = np.nan_to_num(-values if said == "down" else values, nan=0.0)
-    words = f"{one.name} of {name}, positive {said}"
+    sense = _sense(name, variable, values[np.isfinite(values)], asked.positive)
+    height = np.nan_to_num(-values if sense == "down" else values, nan=0.0)
+    description = f"{variable.name} of {name}, positive {sense}"
     if marks:
-        told = ", ".join(f"{mark / factor:g}" for mark in marks)
-        words += f", where {told} ({int(gone.sum())} points) is taken as no data"
+        listed = ", ".join(f"{mark / factor:g}" for mark in marks)
+        description += f", where {listed} ({int(gone.sum())} points) is taken as no data"
     if (without := int(np.isnan(values).sum())) > 0:
-        words += f", {without} points without data taken as land"
-    return Bottom(cut.grid, height, True, words)
+        description += f", {without} points without data taken as land"
+    return Bottom(cut.grid, height, True, description)

@@ -1,4 +1,4 @@
-"""Times of ocean files in UTC: instants or means, runs with lead times, files that do not say when they are."""
+"""Times of ocean files in UTC: instants, means, forecast runs with lead times, files without a time."""
 
 import re
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ REFERENCE = re.compile(
 LEAD = re.compile(
     r"^(step|lead|lead_time|leadtime|forecast_period|forecast_hour|fhour|tau|prediction_timedelta)$", re.I
 )
-"""Names of the time since then."""
+"""Names of the time since the forecast began (the lead time)."""
 MEAN_TITLES = re.compile(
     r"\b(daily|hourly|monthly|weekly|annual|yearly|time|\d+.?(day|hour|month)\w*)[\s_-]*(mean|average)"
     r"|\baverages? file|(mean|average)s? (of|over) (one|a|each|\d)|(?<![A-Za-z])P(1D|1M|T\d+H)-m\b|\bday_mean\b"
     r"|\b(mean|average)d? fields?",
     re.I,
 )
-"""Titles and products that speak of means over time."""
+"""Titles and products that contain one of these phrases are means over time."""
 TITLES = (
     "title",
     "id",
@@ -45,16 +45,17 @@ MEAN_WORDS = ("mean", "average", "averaged", "avg")
 
 @dataclass(frozen=True)
 class Clock:
-    """`times` (nt) UTC in the order of the file, None where it does not say; `dims` along which they lie.
+    """The times of a variable.
 
-    `picked`: places along other dimensions that the user chose. `words`: what was taken for what; `stamps`:
-    whether values are means, and where in their interval the file's times stand.
+    `times` (nt): UTC, in the order of the file, or None if the file has no time. `dims`: the dimensions of the
+    times. `picked`: indices along other dimensions that the user chose. `description`: how the times were read.
+    `stamps`: whether values are means, and where in their interval the times of the file stand.
     """
 
     times: Times | None
     dims: tuple[str, ...]
     picked: dict[str, int]
-    words: str
+    description: str
     stamps: str
     notes: tuple[str, ...]
 
@@ -62,16 +63,16 @@ class Clock:
 NO_CLOCK = Clock(None, (), {}, "", "instants: the file has no time", ())
 
 
-def clock_of(at: Catalogue, variable: Any, own: tuple[str, str] | None) -> Clock:
-    """The times of a variable, whose dimension and coordinate of time are `own`, if it has such."""
+def clock_of(at: Catalogue, variable: Any, axis: tuple[str, str] | None) -> Clock:
+    """Return the times of a variable; `axis` is the dimension and the coordinate of its time, if it has one."""
     forecast = _forecast(at, variable)
     if forecast is not None:
         return forecast
-    name = own[1] if own is not None else at.scalar(variable, "time")
+    name = axis[1] if axis is not None else at.scalar(variable, "time")
     if name is None:
         return NO_CLOCK
-    dims = () if own is None else (own[0],)
-    count, more = _decoded(at, at.data[name], at.said)
+    dims = () if axis is None else (axis[0],)
+    count, more = _decoded(at, at.data[name], at.names)
     if count is None:
         return Clock(None, dims, {}, name, "instants: nothing says when", more)
     count, stamps, notes = _middles(at, variable, name, count)
@@ -82,52 +83,52 @@ def _rounded(values: NDArray[Any]) -> Times:
     return (values.astype("datetime64[us]") + np.timedelta64(500, "us")).astype("datetime64[ms]")
 
 
-def _units(variable: Any, said: Names) -> str:
-    """The unit of a time, with the origin that the user gives where the file gives none."""
+def _units(variable: Any, names: Names) -> str:
+    """Return the unit of a time; if it has no origin, the origin that the user gives is added."""
     units = units_of(variable)
-    if SINCE.search(units) or said.origin is None:
+    if SINCE.search(units) or names.origin is None:
         return units
-    origin = str(parse_time(said.origin, "`origin`").astype("datetime64[s]")).replace("T", " ")
+    origin = str(parse_time(names.origin, "`origin`").astype("datetime64[s]")).replace("T", " ")
     alone = re.sub(r"\bsince\b.*", "", units).strip()
     require(
         in_seconds(alone) is not None,
-        f"the time `{variable.name}` is in {alone!r}, which is no unit of time that can count from an origin",
+        f"the time `{variable.name}` is in {alone!r}, which is not a unit of time that can count from an origin",
     )
     return f"{alone} since {origin}"
 
 
 def _decoded(
-    at: Catalogue, variable: Any, said: Names, units: str | None = None
+    at: Catalogue, variable: Any, names: Names, units: str | None = None
 ) -> tuple[Times | None, tuple[str, ...]]:
-    """UTC, or None for a single time that does not say when; notes."""
+    """Return the times in UTC and notes; None for a single time whose date is unknown."""
     import xarray
 
     broken = f"the time `{variable.name}` in {at.name}"
-    units = units or _units(variable, said)
+    units = units or _units(variable, names)
     if not SINCE.search(units):
         require(
             variable.size == 1,
             f'{broken} has no unit such as "hours since 1950-01-01" (it has {units or "none"!r}), so '
-            f"{variable.size} times are unknown: name `origin` in `names`, the date from which they count",
+            f"{variable.size} times are unknown: set `origin` in `names`, the date from which they count",
         )
-        return None, (f"`{variable.name}` does not say when it is",)
+        return None, (f"`{variable.name}` has no date",)
     raw = np.atleast_1d(np.asarray(variable.values))
     require(raw.dtype.kind in "fiu" and bool(np.isfinite(raw).all()), f"{broken} has missing values")
     calendar = str(variable.attrs.get("calendar", "standard"))
     try:
-        # alone: other coordinates of the file, which cannot be decoded, must not be dragged along
+        # decoded alone: other coordinates of the file may not be decodable
         bare = xarray.Dataset({"time": (tuple("abc"[: raw.ndim]), raw, {"units": units, "calendar": calendar})})
         values = np.asarray(xarray.decode_cf(bare)["time"].values)
     except Exception as error:
-        # what an impossible unit makes the libraries raise is not written down anywhere
+        # the libraries do not document what they raise for an impossible unit
         raise InputError(
             f"{broken} cannot be read: units {units!r}, calendar {calendar!r} ({str(error).splitlines()[0]})"
         ) from None
     notes: tuple[str, ...] = ()
     if values.dtype.kind == "O":
         try:
-            # by its label: 1 March stays 1 March, whatever February was
-            flat = [np.datetime64(one.isoformat(), "us") for one in values.ravel()]
+            # the date is kept: 1 March stays 1 March, however long February was
+            flat = [np.datetime64(moment.isoformat(), "us") for moment in values.ravel()]
             values = np.array(flat).reshape(values.shape)
         except ValueError:
             raise InputError(f"{broken} has dates of the calendar {calendar!r} that do not exist") from None
@@ -136,7 +137,7 @@ def _decoded(
 
 
 def _over_time(variable: Any, clock: str) -> str:
-    """How `cell_methods` says that values stand for their time: mean, point, ..., or nothing."""
+    """Return how values stand for their time by `cell_methods` ("mean", "point", ...), or an empty text."""
     methods = str(variable.attrs.get("cell_methods", "")).lower()
     for names, method in re.findall(r"((?:\w+\s*:\s*)+)(\w+)", re.sub(r"\([^)]*\)", "", methods)):
         if {"time", "t", clock.lower()} & set(re.findall(r"\w+", names)):
@@ -146,23 +147,23 @@ def _over_time(variable: Any, clock: str) -> str:
 
 
 def _middles(at: Catalogue, variable: Any, clock: str, times: Times) -> tuple[Times, str, tuple[str, ...]]:
-    """Times at the middle of the intervals that values are means over; words on it; notes."""
+    """Return the times, a description and notes; times of means are moved to the middle of their intervals."""
     method = _over_time(variable, clock)
     mean = method in MEAN_WORDS
-    if at.said.stamps is not None:
-        # the interval is known once all files are joined
-        return times, f"means, stamped at the {at.said.stamps} of their interval, as you say", ()
+    if at.names.stamps is not None:
+        # the interval is known only when all files are joined
+        return times, f"means, stamped at the {at.names.stamps} of their interval, as you say", ()
     if "climatology" in at.data[clock].attrs:
-        note = f"`{clock}` is of a climatology: means over several years, no forecast of any day"
+        note = f"`{clock}` is a climatology: means over several years, not a forecast"
         return times, "a climatology", (note,)
     bounds = str(at.data[clock].attrs.get("bounds", ""))
     if method == "point":
         return times, "instants, as `cell_methods` says", ()
     if bounds in at.data.variables and at.data[bounds].shape == (times.size, 2):
         limits = at.data[bounds]
-        units = units_of(limits) or _units(at.data[clock], at.said)
+        units = units_of(limits) or _units(at.data[clock], at.names)
         known = limits.assign_attrs(calendar=at.data[clock].attrs.get("calendar", "standard"))
-        ends, _ = _decoded(at, known.rename(bounds), at.said, units)
+        ends, _ = _decoded(at, known.rename(bounds), at.names, units)
         assert ends is not None
         middle = ends[:, 0] + (ends[:, 1] - ends[:, 0]) // 2
         hours = (middle - times) / np.timedelta64(3_600_000, "ms")
@@ -171,25 +172,25 @@ def _middles(at: Catalogue, variable: Any, clock: str, times: Times) -> tuple[Ti
         span = float((np.abs(ends[:, 1] - ends[:, 0])).max() / np.timedelta64(3_600_000, "ms"))
         if span == 0:
             return times, f"instants, as `{bounds}` says", ()
-        words = f"means over {span:g} h, at the middle of `{bounds}`"
+        stamps = f"means over {span:g} h, at the middle of `{bounds}`"
         off = float(np.abs(hours).max())
         if off < 1e-3:
-            return times, words, ()
-        return middle, words, (f"the times stand {off:g} h from the middle of `{bounds}`: taken at the middle",)
+            return times, stamps, ()
+        return middle, stamps, (f"the times are {off:g} h from the middle of `{bounds}`: the middle is used",)
     title = next((text for key in TITLES if MEAN_TITLES.search(text := str(at.data.attrs.get(key, "")))), None)
     title = "field_type = mean" if str(at.data.attrs.get("field_type", "")).lower() == "mean" else title
     if mean or title is not None:
         why = f"`{variable.name}` says {method!r} over time" if mean else f"the file says {title[:60]!r}"  # type: ignore[index]
         note = (
-            f"{why}, and gives no bounds of its times: read as if each stood at the middle of its interval; "
-            'name `stamps` = "start" or "end" in `names` if it does not'
+            f"{why}, and gives no bounds of its times: each time is taken as the middle of its interval; "
+            'set `stamps` = "start" or "end" in `names` if it is not'
         )
         return times, "means, taken to stand at the middle of their interval (no bounds)", (note,)
     return times, "instants: nothing says that they are means", ()
 
 
 def _forecast(at: Catalogue, variable: Any) -> Clock | None:
-    """Times of runs and lead times, where a variable has such dimensions."""
+    """Return the times of a forecast from its runs and lead times, or None if the variable has no lead time."""
     dims = [str(dim) for dim in variable.dims]
     lead = next((dim for dim in dims if _is_lead(at, dim)), None)
     if lead is None:
@@ -207,8 +208,8 @@ def _forecast(at: Catalogue, variable: Any) -> Clock | None:
         None,
     )
     if valid is not None:
-        one = valid.isel({dim: n for dim, n in picked.items() if dim in valid.dims})
-        times, notes = _decoded(at, one, at.said)
+        chosen_times = valid.isel({dim: n for dim, n in picked.items() if dim in valid.dims})
+        times, notes = _decoded(at, chosen_times, at.names)
         return Clock(
             times, (lead,), picked, f"{valid.name}{chosen}", "instants: nothing says that they are means", notes
         )
@@ -216,31 +217,36 @@ def _forecast(at: Catalogue, variable: Any) -> Clock | None:
     if len(starts) != 1:
         raise InputError(
             f"`{variable.name}` in {at.name} counts its times by `{lead}` from the start of a forecast, "
-            "which the file does not give; name `time` in `names`, or add the variable of the reference time"
+            "which the file does not give; set `time` in `names`, or add a variable with the reference time"
         )
     start = at.data[starts[0]].isel({dim: n for dim, n in picked.items() if dim in at.data[starts[0]].dims})
-    begin, notes = _decoded(at, start, at.said)
+    begin, notes = _decoded(at, start, at.names)
     if begin is None:
         return None
     period = at.data[lead]
     seconds = in_seconds(units_of(period))
     if seconds is None:
         raise InputError(
-            f"the lead time `{lead}` in {at.name} is in {units_of(period)!r}, which is no unit of time"
+            f"the lead time `{lead}` in {at.name} is in {units_of(period)!r}, which is not a unit of time"
         )
     after = np.rint(np.asarray(period.values, np.float64) * seconds * 1e3).astype("timedelta64[ms]")
-    words = f"{starts[0]} + {lead}{chosen}"
+    description = f"{starts[0]} + {lead}{chosen}"
     return Clock(
-        begin.ravel()[0] + after, (lead,), picked, words, "instants: nothing says that they are means", notes
+        begin.ravel()[0] + after,
+        (lead,),
+        picked,
+        description,
+        "instants: nothing says that they are means",
+        notes,
     )
 
 
 def _is_lead(at: Catalogue, dim: str) -> bool:
     if dim not in at.data.variables or at.data[dim].dims != (dim,):
         return False
-    one = at.data[dim]
-    named = standard_name(one) == "forecast_period" or LEAD.match(dim) is not None
-    return named and not SINCE.search(units_of(one))
+    variable = at.data[dim]
+    named = standard_name(variable) == "forecast_period" or LEAD.match(dim) is not None
+    return named and not SINCE.search(units_of(variable))
 
 
 def _is_reference(at: Catalogue, dim: str) -> bool:
@@ -253,37 +259,39 @@ def _is_reference(at: Catalogue, dim: str) -> bool:
 
 def _is_start(at: Catalogue, name: str, run: str | None) -> bool:
     """Whether a variable is the time at which the chosen run begins."""
-    one = at.data[name]
-    if not SINCE.search(_units(one, at.said)):
+    variable = at.data[name]
+    if not SINCE.search(_units(variable, at.names)):
         return False
     if run is not None:
-        return bool(one.dims == (run,))
-    known = standard_name(one) in ("forecast_reference_time", "time") or REFERENCE.match(name) or name == "time"
-    return one.size == 1 and bool(known)
+        return bool(variable.dims == (run,))
+    known = (
+        standard_name(variable) in ("forecast_reference_time", "time") or REFERENCE.match(name) or name == "time"
+    )
+    return variable.size == 1 and bool(known)
 
 
 def _chosen_run(at: Catalogue, variable: Any, run: str) -> tuple[dict[str, int], str]:
-    """Which run is read: the only one, or the user's word."""
+    """Return the index of the run that is read (the only one, or the user's choice) and a text about it."""
     size = variable.sizes[run]
     if size == 1:
         return {run: 0}, ""
-    said = at.said.run
-    known = _decoded(at, at.data[run], at.said)[0] if run in at.data.variables else None
+    wanted = at.names.run
+    known = _decoded(at, at.data[run], at.names)[0] if run in at.data.variables else None
     listed = (
         "" if known is None else f", {known[0].astype('datetime64[s]')}Z to {known[-1].astype('datetime64[s]')}Z"
     )
     require(
-        said is not None,
-        f"{at.name} holds {size} runs of a forecast along `{run}`{listed}: name `run` in `names`, its number "
-        "from 0 or its date",
+        wanted is not None,
+        f"{at.name} holds {size} runs of a forecast along `{run}`{listed}: set `run` in `names` "
+        "to its number, counted from 0, or its date",
     )
-    if isinstance(said, int):
-        require(0 <= said < size, f"`run` must be a number from 0 to {size - 1} in {at.name}; got {said}")
-        which = said
+    if isinstance(wanted, int):
+        require(0 <= wanted < size, f"`run` must be a number from 0 to {size - 1} in {at.name}; got {wanted}")
+        which = wanted
     else:
-        when = parse_time(str(said), "`run`")
+        when = parse_time(str(wanted), "`run`")
         hits = np.flatnonzero(known == when) if known is not None else np.zeros(0, np.int64)
-        require(len(hits) == 1, f"{at.name} holds no run of {said}{listed}; name another `run`")
+        require(len(hits) == 1, f"{at.name} holds no run of {wanted}{listed}; name another `run`")
         which = int(hits[0])
-    told = which if known is None else f"{known[which].astype('datetime64[s]')}Z"
-    return {run: which}, f", run {told} of {size}"
+    label = which if known is None else f"{known[which].astype('datetime64[s]')}Z"
+    return {run: which}, f", run {label} of {size}"

@@ -1,4 +1,4 @@
-"""Reading one component out of one open file, step by step."""
+"""Reads one component of the current from one open file, step by step."""
 
 import math
 import re
@@ -34,25 +34,25 @@ Values = NDArray[np.float32]
 Domain = tuple[Range, Range, Range]
 
 CALM = 5.0
-"""The most that a file without a unit may hold to pass for m/s."""
+"""A file without a unit is taken as m/s if no value is above this."""
 ANGLES = re.compile(r"^(angle|anglet|ang|alpha|angle_dx|angle_rho|grid_angle|rotang)$", re.IGNORECASE)
 ENSEMBLE = re.compile(
     r"^(n?ens|ensemble(_member)?|ens_member|members?|number|realization|realisation)$", re.IGNORECASE
 )
 """Names of the dimension along which the members of an ensemble lie."""
 POLAR = 65.0
-"""A global model's nominal axes are no places beyond this latitude [degrees]."""
+"""North of this latitude [degrees] the nominal axes of a global model do not give positions."""
 
 
 class TooLargeError(InputError):
-    """Currents that take more memory than they may."""
+    """Currents would take more memory than they may."""
 
 
 @dataclass(frozen=True)
 class Points:
-    """Where a component lies: `dims` across and along the rows, and which of the file's `rows` and `columns`.
+    """The points of a component: `dims` across and along the rows, and the file's `rows` and `columns` in use.
 
-    `placeless` (ny, nx): points that have no place in the file.
+    `placeless` (ny, nx): points that have no position in the file.
     """
 
     dims: tuple[str, str]
@@ -64,7 +64,7 @@ class Points:
     notes: tuple[str, ...]
 
     def cut(self, name: str, domain: Domain | None) -> "Points":
-        """Those that a domain needs, with a margin."""
+        """Return the points that a domain needs, with a margin."""
         if domain is None:
             return self
         middle = float(wrapped((domain[0][0] + (domain[0][1] - domain[0][0]) % 360 / 2), 0.0))
@@ -75,26 +75,26 @@ class Points:
         )
 
     def of(self, field: Array) -> Array:
-        """A field (..., ny, nx) of all the file's points at these."""
+        """Return the values at these points of a field (..., ny, nx) that covers the whole file."""
         return field[..., self.rows, :][..., self.columns]
 
 
 class Component:
-    """One component, `variable`, of one open file; `how` it was found."""
+    """One component of the current in one open file; `how` tells by which rule its variable was found."""
 
     def __init__(self, at: Catalogue, component: str, name: str, how: str) -> None:
-        self.at, self.said, self.file = at, at.said, at.name
+        self.at, self.names, self.file = at, at.names, at.name
         self.component, self.name, self.how = component, name, how
         self.variable = at.data[name]
 
     def part(self, domain: Domain | None, room: float, whole_depth: bool) -> Part:
-        """The component in a domain; no more than `room` [bytes], or InputError."""
+        """Return the component in a domain; InputError if it needs more memory than `room` [bytes]."""
         sense = self.at.check_sense(self.component, self.name)
         every = self._points()
         clock, axes, single, notes = self._axes(every.dims)
         levels = levels_of(self.at, self.variable, axes)
         self._check_used(
-            {"lon": every.took["lon"], "lat": every.took["lat"], "depth": levels.name, "time": clock.words}
+            {"lon": every.took["lon"], "lat": every.took["lat"], "depth": levels.name, "time": clock.description}
         )
         factor, units = self._factor()
         points = every.cut(self.file, domain)
@@ -115,10 +115,18 @@ class Component:
         if deeper is not None:
             deeper = clear_marks(self.file, self.name, deeper, factor)[0]
         times, values = _in_order(clock.times, values)
-        told = (*sense, *every.notes, *notes.words, *clock.notes, *more, *marks, *self._doubts(values, factor))
+        notes_of_all = (
+            *sense,
+            *every.notes,
+            *notes.description,
+            *clock.notes,
+            *more,
+            *marks,
+            *self._doubts(values, factor),
+        )
         took = {self.component: f"{self.name} ({self.how}, {units})", **every.took}
-        took |= {"depth": levels.words} if levels.words else {}
-        took |= {"time": clock.words} if clock.words else {}
+        took |= {"depth": levels.description} if levels.description else {}
+        took |= {"time": clock.description} if clock.description else {}
         took |= {"stamps": clock.stamps}
         return Part(
             self.component,
@@ -129,7 +137,7 @@ class Component:
             values,
             deeper,
             took,
-            tuple(dict.fromkeys(told)),
+            tuple(dict.fromkeys(notes_of_all)),
             self._way(),
             signs_of(self.at, self.variable),
             dict(self._fields(points, levels, floor)),
@@ -137,10 +145,10 @@ class Component:
         )
 
     def _points(self) -> Points:
-        """Where the component lies in the whole file."""
+        """Return the points of the component in the whole file."""
         dims, lon, lat = horizontal_of(self.at, self.variable, self.component)
         took = {"lon": str(lon.name), "lat": str(lat.name)}
-        many = "of two points or more: a current at one position is no grid to plan on"
+        many = "of two points or more: a plan needs a grid, and a current at one position is not a grid"
         if lon.ndim == 1:
             (at_lon, columns), (at_lat, rows) = degrees(self.file, lon, "lon"), degrees(self.file, lat, "lat")
             require(
@@ -154,13 +162,16 @@ class Component:
         ny, nx = own_lon.shape
         notes: tuple[str, ...] = ()
         if placeless.any():
-            notes = (f"{int(placeless.sum())} points of `{lon.name}` have no place of their own: taken as land",)
+            notes = (f"{int(placeless.sum())} points of `{lon.name}` have no position: taken as land",)
         return Points(dims, grid_of(own_lon, own_lat), np.arange(ny), np.arange(nx), placeless, took, notes)
 
     def _axes(
         self, horizontal: tuple[str, str]
     ) -> "tuple[Clock, dict[str, tuple[str, str]], list[str], _Choice]":
-        """Times; dimension and coordinate of depth, faces or sigma; dimensions of one element; others chosen."""
+        """Return the axes of the variable: times; depth, faces or sigma; left-out dimensions; chosen indices.
+
+        Depth, faces and sigma are given by dimension and coordinate. Dimensions of one element are left out.
+        """
         clock = clock_of(self.at, self.variable, self._own_time(horizontal))
         axes: dict[str, tuple[str, str]] = {}
         single: list[str] = []
@@ -182,7 +193,7 @@ class Component:
             else:
                 raise no_axis(self.at, self.variable, dim)
         left_out = tuple(f"the dimension `{dim}` of one element is left out" for dim in single)
-        return clock, axes, single, _Choice(choice.picked, (*left_out, *choice.words))
+        return clock, axes, single, _Choice(choice.picked, (*left_out, *choice.description))
 
     def _own_time(self, horizontal: tuple[str, str]) -> tuple[str, str] | None:
         for dim in map(str, self.variable.dims):
@@ -194,42 +205,42 @@ class Component:
 
     def _is_ensemble(self, dim: str) -> bool:
         known = dim in self.at.data.variables and standard_name(self.at.data[dim]) == "realization"
-        return known or ENSEMBLE.match(dim) is not None or self.said.member is not None
+        return known or ENSEMBLE.match(dim) is not None or self.names.member is not None
 
     def _chosen_member(self, dim: str) -> "_Choice":
-        """The member of an ensemble that the user names: by its label where there are labels, else from 0."""
-        size, said = self.variable.sizes[dim], self.said.member
+        """Return the index of the ensemble member that the user names: by its label, or from 0 without labels."""
+        size, wanted = self.variable.sizes[dim], self.names.member
         labels = (
             [str(label) for label in self.at.data[dim].values.ravel()] if dim in self.at.data.variables else []
         )
         listed = f", {labels[0]} to {labels[-1]}" if labels else f", 0 to {size - 1}"
         require(
-            said is not None,
+            wanted is not None,
             f"`{self.name}` in {self.file} holds {size} members along `{dim}`{listed}: "
-            "name `member` in `names`, such as member=0",
+            "set `member` in `names`, such as member=0",
         )
         known = labels or [str(n) for n in range(size)]
         require(
-            str(said) in known,
-            f"{self.file} holds no member {said!r} along `{dim}`{listed}; name another `member`",
+            str(wanted) in known,
+            f"{self.file} holds no member {wanted!r} along `{dim}`{listed}; name another `member`",
         )
-        return _Choice({dim: known.index(str(said))}, (f"member {said} of {size} along `{dim}`, as you say",))
+        return _Choice({dim: known.index(str(wanted))}, (f"member {wanted} of {size} along `{dim}`, as you say",))
 
     def _check_used(self, found: dict[str, str]) -> None:
-        """InputError where a coordinate that the user names is not the one that the component has."""
-        for key, words in found.items():
-            said = getattr(self.said, key)
-            used = said is None or said in re.findall(r"[\w.\-]+", words)
+        """Raise InputError if the user names a coordinate that the component does not have."""
+        for key, description in found.items():
+            named = getattr(self.names, key)
+            used = named is None or named in re.findall(r"[\w.\-]+", description)
             require(
-                used or said not in self.at.data.variables,
-                f"`{key}` = {said!r} is no coordinate of `{self.name}` in {self.file}"
-                + (f", which has {words.split(',')[0]!r}" if words else "")
+                used or named not in self.at.data.variables,
+                f"`{key}` = {named!r} is not a coordinate of `{self.name}` in {self.file}"
+                + (f", which has {description.split(',')[0]!r}" if description else "")
                 + f" ({', '.join(map(str, self.variable.dims))}); name another, or leave it out",
             )
 
     def _factor(self) -> tuple[float | None, str]:
-        """Into m/s, and the unit; None where the file gives none."""
-        units = self.said.units or units_of(self.variable)
+        """Return the factor to m/s (None if the file gives no unit) and the unit."""
+        units = self.names.units or units_of(self.variable)
         if not units.strip():
             inside = re.search(r"[(\[]([^()\[\]]+)[)\]]\s*$", str(self.variable.attrs.get("long_name", "")))
             units = inside.group(1) if inside and in_metres_per_second(inside.group(1)) else ""
@@ -238,44 +249,54 @@ class Component:
         factor = in_metres_per_second(units)
         if factor is None:
             raise InputError(
-                f"`{self.name}` in {self.file} is in {units!r}, which is no speed that is known; "
-                'name `units` in `names`, such as "m/s" or "cm/s"'
+                f"`{self.name}` in {self.file} is in {units!r}, which is not a known unit of speed; "
+                'set `units` in `names`, such as "m/s" or "cm/s"'
             )
         return factor, units.strip()
 
     def _way(self) -> str:
-        """Whether a component runs toward east or north, along the grid, or does not say."""
-        if self.said.rotate is not None:
-            return "east" if self.said.rotate == "none" else "grid"
+        """Return the direction of a component: "east" (or north), "grid" (along the rows), or "unsure"."""
+        if self.names.rotate is not None:
+            return "east" if self.names.rotate == "none" else "grid"
         name = self.name.lower()
-        standard, words = standard_name(self.variable), str(self.variable.attrs.get("long_name", "")).lower()
+        standard, long_name = standard_name(self.variable), str(self.variable.attrs.get("long_name", "")).lower()
         if ALONG_GRID.search(standard) or ALONG_GRID.search(name):
             return "grid"
         if TOWARD_EAST.search(standard) or TOWARD_EAST.search(name):
             return "east"
-        if ALONG_WORDS.search(words):
+        if ALONG_WORDS.search(long_name):
             return "grid"
-        return "east" if TOWARD_EAST.search(words.replace("_", " ")) else "unsure"
+        return "east" if TOWARD_EAST.search(long_name.replace("_", " ")) else "unsure"
 
     def _fixed(self, levels: Levels) -> Levels:
-        """Terrain-following levels as levels of fixed depth: of the whole grid, so that u and v get the same."""
+        """Return levels of fixed depth for terrain-following levels.
+
+        They depend on the whole grid, so that u and v get the same.
+        """
         assert levels.sigma is not None
         depth = fixed_depths(levels.sigma, np.asarray(levels.sigma.depth.values, np.float64))
         top = 0.0 if levels.sigma.high[0] == 0.0 else float(depth[0])
-        words = levels.words
+        description = levels.description
         if not levels.sigma.whole:
-            words += f": data at {depth[0]:.4g} to {depth[-1]:.4g} m"
+            description += f": data at {depth[0]:.4g} to {depth[-1]:.4g} m"
         order, extent = np.arange(depth.size), f"{top:.4g} to {depth[-1]:.6g} m"
-        return replace(levels, depth=depth, lower=depth, top=top, order=order, words=words, extent=extent)
+        return replace(
+            levels, depth=depth, lower=depth, top=top, order=order, description=description, extent=extent
+        )
 
     def _wanted_levels(self, levels: Levels, domain: Domain | None, whole_depth: bool) -> slice:
-        """The levels that a domain needs, from the uppermost on: what is land is seen there."""
-        if domain is None or whole_depth or levels.depth is None or check_hold(self.file, self.said.hold, levels):
+        """Return the levels that a domain needs, beginning with the uppermost, which shows the land."""
+        if (
+            domain is None
+            or whole_depth
+            or levels.depth is None
+            or check_hold(self.file, self.names.hold, levels)
+        ):
             return slice(0, levels.count)
         return slice(0, min(levels_for(self.file, levels.depth, domain[2], levels.top).stop, levels.count))
 
     def _check_room(self, sizes: tuple[int, int, int, int], room: float) -> None:
-        # as the planner holds it, in float64; the other component takes as much again
+        # the planner holds float64; the other component takes the same room
         need = 8.0 * math.prod(sizes)
         if (need if self.component == "v" else 2 * need) > room:
             raise TooLargeError(
@@ -293,7 +314,7 @@ class Component:
         which: slice,
         floor: Array | None,
     ) -> tuple[Values, tuple[str, ...]]:
-        """Values (nt, nz, ny, nx) as the file has them, NaN where it says that there are none; notes."""
+        """Return values (nt, nz, ny, nx), NaN where the file declares no data, and notes."""
         place, order = self._selection(points, levels, clock, picked, which)
         raw = np.asarray(self.variable.isel(place).transpose(*filter(None, order)).values, dtype=np.float32)
         nt = raw.shape[0] if clock.dims else 1
@@ -319,7 +340,7 @@ class Component:
     def _selection(
         self, points: Points, levels: Levels, clock: Clock, picked: dict[str, int], which: slice
     ) -> tuple[dict[str, Any], Order]:
-        """What of the variable is read, and its dimensions of time, depth (None without), rows and columns."""
+        """Return the indices to read and the dimensions of time, depth (None without one), rows and columns."""
         place: dict[str, Any] = dict(picked)
         place[points.dims[1]], place[points.dims[0]] = _slice(points.columns), _slice(points.rows)
         order: Order = (clock.dims[0] if clock.dims else None, levels.dim, *points.dims)
@@ -330,9 +351,10 @@ class Component:
     def _deeper(
         self, points: Points, levels: Levels, clock: Clock, picked: dict[str, int], read: slice
     ) -> Values | None:
-        """What lies below the levels that were read: how deep a column is does not depend on the domain.
+        """Return the values below the levels that were read; they show how deep a column is.
 
-        One time does, but where a column ends in zeros: these are seabed only if they are zeros at all times.
+        One time is enough. But where a column ends in zeros, all times are read: zeros are seabed only if they
+        are zero at all times.
         """
         if levels.sigma is not None or levels.depth is None or read.stop >= levels.count:
             return None
@@ -355,7 +377,10 @@ class Component:
         masked: int,
         is_whole: bool,
     ) -> Evidence:
-        """What the file's zeros look like on its uppermost level, at the first time; read where some are."""
+        """Return how the zeros on the file's uppermost level look at the first time.
+
+        The level is read only if there are zeros.
+        """
         suspect = ((values == 0) | np.isnan(values)).all(axis=(0, 1)) & (values == 0).any(axis=(0, 1))
         top = values[:1, :1]
         if suspect.any() and not is_whole:
@@ -369,7 +394,7 @@ class Component:
         return Evidence(still, bool(np.isnan(top).any()), masked, count)
 
     def _mask_dims(self, levels: Levels) -> int:
-        found = mask_of(self.file, self.at.data, self.said, self.variable, self.component)
+        found = mask_of(self.file, self.at.data, self.names, self.variable, self.component)
         return 0 if found is None else 3 if levels.dim in found[0].dims else 2
 
     def _doubts(self, values: Values, factor: float | None) -> tuple[str, ...]:
@@ -379,32 +404,38 @@ class Component:
             require(
                 self.name.lower() in IN_METRES and fastest < CALM,
                 f"`{self.name}` in {self.file} has no unit (its largest value is {fastest:.3g}): "
-                'name `units` in `names`, such as "m/s" or "cm/s"',
+                'set `units` in `names`, such as "m/s" or "cm/s"',
             )
-            notes += (f"`{self.name}` has no unit: taken as m/s, as its makers write it; at most {fastest:.2f}",)
+            notes += (
+                f"`{self.name}` has no unit: taken as m/s, the unit that its makers use; at most {fastest:.2f}",
+            )
         return notes + speed_doubts(self.variable, fastest)
 
     def _check_nominal(self, lon: Any, lat: Any, axis: Array) -> None:
-        """A tripolar model's axes name places only up to where its grid bends."""
-        nominal = any("nominal" in str(one.attrs.get("long_name", "")).lower() for one in (lon, lat))
+        """Raise InputError if a tripolar model's axes are used beyond the latitude where its grid bends."""
+        nominal = any(
+            "nominal" in str(axis_variable.attrs.get("long_name", "")).lower() for axis_variable in (lon, lat)
+        )
         require(
             not nominal or axis[-1] <= POLAR,
-            f"the axes `{lon.name}` and `{lat.name}` of {self.file} are nominal, and no places beyond {POLAR:g} "
+            f"the axes `{lon.name}` and `{lat.name}` of {self.file} are nominal and do not give positions beyond "
+            f"{POLAR:g} "
             "degrees north: add the file of the model's grid with two-dimensional longitudes, or cut the file",
         )
 
-    def _over(self, one: Any, points: Points) -> Array:
-        """A field of the grid file at the points of the component: its own, or midway between two."""
-        extra = list(map(str, one.dims[:-2]))
+    def _over(self, field: Any, points: Points) -> Array:
+        """Return a field of the grid file at the points of the component, or its mean between two points."""
+        extra = list(map(str, field.dims[:-2]))
         ny, nx = (self.variable.sizes[dim] for dim in points.dims)
-        if set(points.dims) <= set(map(str, one.dims)):
-            extra = [dim for dim in map(str, one.dims) if dim not in points.dims]
-            values = np.asarray(one.transpose(*extra, *points.dims).values, np.float64)
+        if set(points.dims) <= set(map(str, field.dims)):
+            extra = [dim for dim in map(str, field.dims) if dim not in points.dims]
+            values = np.asarray(field.transpose(*extra, *points.dims).values, np.float64)
         else:
-            values = np.asarray(one.values, np.float64)
+            values = np.asarray(field.values, np.float64)
         require(
             len(extra) <= 1 and values.size < 5e7,
-            f"`{one.name}` in {self.file} has dimensions {', '.join(map(str, one.dims))}, too many",
+            f"`{field.name}` in {self.file} has dimensions {', '.join(map(str, field.dims))}, which is more than "
+            "rows, columns and one other; give a `bottom` in `names` without them",
         )
         values = np.where(np.abs(values) < 2e4, values, np.nan)
         shape = values.shape[-2:]
@@ -414,29 +445,29 @@ class Component:
             return halves(values, -2)
         require(
             shape == (ny, nx),
-            f"`{one.name}` in {self.file} has {shape[0]} x {shape[1]} points, `{self.name}` {ny} x {nx}: "
+            f"`{field.name}` in {self.file} has {shape[0]} x {shape[1]} points, `{self.name}` {ny} x {nx}: "
             "they do not fit",
         )
         return values
 
     def _masked(self, values: Values, place: dict[str, Any], order: Order) -> Values:
-        """NaN where a mask on the component's own points says land."""
-        mask = mask_of(self.file, self.at.data, self.said, self.variable, self.component)
+        """Return the values with NaN where a mask on the component's points marks land."""
+        mask = mask_of(self.file, self.at.data, self.names, self.variable, self.component)
         if mask is None:
             return values
-        one, land = mask
-        here = one.isel({dim: at for dim, at in place.items() if dim in one.dims})
-        own = [dim for dim in order if dim is not None and dim in here.dims]
+        variable, land = mask
+        here = variable.isel({dim: at for dim, at in place.items() if dim in variable.dims})
+        dims = [dim for dim in order if dim is not None and dim in here.dims]
         if land is None:
             raise InputError(
-                f"the mask `{one.name}` in {self.file} does not say whether land is 0 or 1: name `land` in "
+                f"the mask `{variable.name}` in {self.file} does not say whether land is 0 or 1: set `land` in "
                 '`names`, or `mask` = "none" to leave it out'
             )
-        numbers = np.asarray(here.transpose(*own).values, np.float64)
-        return np.where(spread_over(numbers, own, order) == land, np.float32(np.nan), values)
+        numbers = np.asarray(here.transpose(*dims).values, np.float64)
+        return np.where(spread_over(numbers, dims, order) == land, np.float32(np.nan), values)
 
     def _fields(self, points: Points, levels: Levels, floor: Array | None) -> Iterator[tuple[str, Field]]:
-        """What the file says of the grid at places of its own."""
+        """Yield the fields of the grid that have their own positions: the seabed and the angle of the rows."""
         if floor is not None and levels.sigma is not None:
             lon, lat = points.grid.mesh()
             yield "seabed", Field(str(levels.sigma.depth.name), lon.ravel(), lat.ravel(), floor.ravel())
@@ -449,25 +480,26 @@ class Component:
             yield "angle", angle
 
     def _angle(self) -> Field | None:
-        """The angle from east to the rows, where the file says it."""
-        said = self.said.rotate
-        if said in ("none", "grid"):
+        """Return the angle from east to the rows, if the file holds it."""
+        rotate = self.names.rotate
+        if rotate in ("none", "grid"):
             return None
         require(
-            said is None or said in self.at.data.variables,
-            f'{self.file} holds no variable `{said}` to rotate by; name one of it, "grid" or "none"',
+            rotate is None or rotate in self.at.data.variables,
+            f"{self.file} holds no variable `{rotate}` to rotate by; set `rotate` to one of its variables, "
+            '"grid" or "none"',
         )
-        for name in map(str, self.at.data.variables) if said is None else [said]:
-            one = self.at.data[name].squeeze()
-            known = ANGLES.match(name) or standard_name(one) == "angle_of_rotation_from_east_to_x"
-            if one.ndim != 2 or not (name == said or known):
+        for name in map(str, self.at.data.variables) if rotate is None else [rotate]:
+            variable = self.at.data[name].squeeze()
+            known = ANGLES.match(name) or standard_name(variable) == "angle_of_rotation_from_east_to_x"
+            if variable.ndim != 2 or not (name == rotate or known):
                 continue
-            where = places_of(self.at, one)
+            where = places_of(self.at, variable)
             if where is None:
                 continue
-            angle = np.asarray(one.values, np.float64).ravel()
+            angle = np.asarray(variable.values, np.float64).ravel()
             angle = np.where(np.isfinite(angle) & (np.abs(angle) < 1e4), angle, np.nan)
-            units = str(one.attrs.get("units", "")).lower()
+            units = str(variable.attrs.get("units", "")).lower()
             wide = not units and float(np.nanmax(np.abs(angle), initial=0)) > 2 * np.pi
             angle = np.radians(angle) if units.startswith("degree") or wide else angle
             return Field(name, *where, np.nan_to_num(angle))
@@ -476,14 +508,14 @@ class Component:
 
 @dataclass(frozen=True)
 class _Choice:
-    """Places along dimensions that are no axis, and words on them."""
+    """Indices along dimensions without an axis, and notes about them."""
 
     picked: dict[str, int]
-    words: tuple[str, ...]
+    description: tuple[str, ...]
 
 
 def _slice(which: Index) -> Any:
-    """An index along a file's axis: a slice where it can be, which reads faster."""
+    """Return indices along a file's axis as a slice if possible, since a slice reads faster."""
     if which.size > 1 and bool((np.diff(which) == 1).all()):
         return slice(int(which[0]), int(which[-1]) + 1)
     return which

@@ -1,4 +1,4 @@
-"""How far a current is from one that a stream function has."""
+"""Measures how far a current is from one that has a stream function."""
 
 import numpy as np
 
@@ -8,17 +8,17 @@ from .grid import EARTH, unit_vectors
 
 
 def _central(values: Array, axis: int) -> Array:
-    """Half the difference of both neighbours, within the rim (ny - 2, nx - 2, ...)."""
+    """Return half the difference of both neighbours, for all points but the rim (ny - 2, nx - 2, ...)."""
     ahead, behind = (slice(2, None), slice(1, -1)), (slice(None, -2), slice(1, -1))
     return np.asarray((values[ahead[:: 1 - 2 * axis]] - values[behind[:: 1 - 2 * axis]]) / 2)
 
 
 def divergence_ratio(file: OceanFile, level: int | None = None) -> float:
-    """Rms horizontal divergence over rms vorticity, in the wet interior cells of one level or of all.
+    """Return rms horizontal divergence over rms vorticity in the wet inner cells of one level, or of all levels.
 
-    0.05 to 0.3 in mesoscale fields, 0.45 to 0.8 in coastal and radar ones; NaN where no cell has neighbours.
-    With the tangents t_i, t_j of rows and columns and their duals, div = dV/di . t^i + dV/dj . t^j and
-    curl = n . (t^i x dV/di + t^j x dV/dj), for V in space: so curved grids need nothing of their own.
+    The ratio is 0.05 to 0.3 in mesoscale fields and 0.45 to 0.8 in coastal and radar fields; NaN if no cell has
+    neighbours. Let t_i, t_j be the tangents of rows and columns and t^i, t^j their duals. Then div = dV/di . t^i
+    + dV/dj . t^j and curl = n . (t^i x dV/di + t^j x dV/dj), with V in space. This also holds on curved grids.
     """
     lon, lat = file.grid.mesh()
     if min(lon.shape) < 3:

@@ -1,4 +1,4 @@
-"""What a current may not be, though its numbers can be read: parts of the current, speeds that no field has."""
+"""Notes on currents that can be read but may be wrong: parts of the current, or speeds that no sea has."""
 
 import re
 from typing import Any
@@ -15,15 +15,15 @@ PARTS = {
     "the baroclinic part": re.compile(r"\bbaroclinic\b"),
     "an average over many years": re.compile(r"\bclimatolog"),
 }
-"""What the names of a variable say of currents that are not the whole one."""
+"""Parts of the current, and the words in a variable's names that tell them."""
 WHOLE = re.compile(r"\btotal\b|\bsum\b|\+|\bincluding\b|\bwith tides?\b")
-"""Long names that speak of all parts together."""
+"""Long names with these words are of the total current."""
 SLOW, FAST = 0.002, 5.0
-"""Hardly any sea is as slow everywhere, or as fast anywhere [m/s]."""
+"""A sea with all speeds below SLOW, or any above FAST [m/s], is unusual."""
 
 
 def doubts_of(variable: Any) -> tuple[str, ...]:
-    """A note where the names of a variable say that it is not the whole current."""
+    """Return a note if the names of a variable say that it is only a part of the current."""
     long = str(variable.attrs.get("long_name", "")).lower()
     text = " ".join([str(variable.name).lower(), standard_name(variable), long]).replace("_", " ")
     if WHOLE.search(long):
@@ -33,18 +33,20 @@ def doubts_of(variable: Any) -> tuple[str, ...]:
         return ()
     return (
         f"`{variable.name}` ({long or standard_name(variable) or 'by its name'}) is {' and '.join(parts)}, "
-        "and not the whole current",
+        "not the whole current",
     )
 
 
 def speed_doubts(variable: Any, fastest: float) -> tuple[str, ...]:
-    """A note where the greatest speed [m/s] of a component is far from what seas have."""
+    """Return a note if the greatest speed [m/s] of a component is unusual for a sea."""
     if SLOW <= fastest <= FAST or fastest == 0.0:
         return ()
     kind = str(variable.encoding.get("dtype", variable.dtype))
     factor = variable.encoding.get("scale_factor", 1.0)
     cause = "is its unit right?"
     if "float" in kind and factor != 1.0:
-        cause = f"its `scale_factor` {float(factor):g} was applied to data that are no integers: is it left over?"
+        cause = (
+            f"its `scale_factor` {float(factor):g} was applied to data that are not integers: is it left over?"
+        )
     rank = "nowhere above" if fastest < SLOW else "as fast as"
     return (f"`{variable.name}` is {rank} {fastest:.2g} m/s: {cause} Name `units` in `names` to correct it",)

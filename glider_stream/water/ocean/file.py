@@ -1,4 +1,4 @@
-"""An ocean file, all conventions resolved."""
+"""The currents of an ocean file after all its conventions are resolved."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -13,18 +13,19 @@ from .grid import Grid
 
 Times = NDArray[np.datetime64]
 YEARS = 1000, 8999
-"""What a scenario counts from its epoch stays within the calendar that Python has, years 1 to 9999."""
+"""The epoch must lie in these years, so that later times stay within Python's calendar, years 1 to 9999."""
 
 
 @dataclass(frozen=True)
 class OceanFile:
-    """Currents as a file holds them: `u` east, `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data.
+    """Currents of a file: `u` east and `v` north (nt, nz, ny, nx) [m/s], NaN where there is no data.
 
-    `grid` (ny, nx); `depth` (nz) rises downward [m]; `times` (nt) UTC, or None if unknown; `wet` (nz, ny, nx)
-    where there is data at every time. `surface`: the file names no depth, or its one level is held at all;
-    `depth` is [0]. `lower` (nz) [m]: how deep the value of each level holds; `top` [m]: how shallow the first.
-    `seabed` (ny, nx) [m, downward]: of the model's own depth or of the deepest level with data, inf where the
-    data go on to the last level. `took` says what was taken for what, `notes` what else to know.
+    `grid` (ny, nx): positions. `depth` (nz) [m, downward] rises. `times` (nt) in UTC, or None if unknown. `wet`
+    (nz, ny, nx): points with data at every time. `surface`: the file has no depth, or its one level is held at
+    all depths; then `depth` is [0]. `lower` (nz) [m]: the depth down to which each level holds. `top` [m]: the
+    depth where the first level begins to hold. `seabed` (ny, nx) [m, downward]: from the model's own depth or
+    from the deepest level with data; inf where data go on to the last level. `took`: which variables were taken
+    for what. `notes`: warnings.
     """
 
     name: str
@@ -42,8 +43,8 @@ class OceanFile:
     top: float
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """What was assumed of bottom, land, levels and times, for a roadmap to keep."""
+    def assumptions(self) -> tuple[str, ...]:
+        """What was assumed about bottom, land, levels and times; a roadmap keeps these texts."""
         return tuple(
             f"{key}: {self.took[key]}" for key in ("bottom", "land", "levels", "stamps") if key in self.took
         )
@@ -55,14 +56,14 @@ class OceanFile:
 
     @property
     def time_range(self) -> str:
-        """First and last time, for people."""
+        """The first and the last time, as a text for people."""
         if self.times is None:
             return "no time"
         return " to ".join(f"{t}Z" for t in np.unique(self.times[[0, -1]]).astype("datetime64[s]"))
 
 
 def parse_time(text: str, what: str) -> np.datetime64:
-    """An ISO 8601 text as UTC; without a zone it is UTC."""
+    """Return an ISO 8601 text as a time in UTC; a text without a zone is in UTC."""
     try:
         when = datetime.fromisoformat(text.strip())
     except (ValueError, AttributeError):

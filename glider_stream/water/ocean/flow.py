@@ -1,4 +1,4 @@
-"""Currents on a grid into what the kernels read: an `OceanGrid` and the `Seabed` beneath it."""
+"""Makes what the kernels read from currents on a grid: an `OceanGrid` and the `Seabed` below it."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,17 +19,18 @@ from .grid import EVEN, Grid, IndexMap, gaps, index_map, span, unbroken
 from .levels import no_such_levels
 
 READ_BEYOND = 2
-"""Cells kept around a domain: paths may stray."""
+"""This many cells are kept around a domain, since paths may leave it a little."""
 HALO = 2
-"""Further cells that fill the dry ones of the margin: a value does not depend on where the domain ends."""
+"""This many further cells fill the dry cells of the margin: values must not depend on the domain's ends."""
 DEPTH_SLACK = 0.01
-"""The deepest level holds for depths this far [m] beyond it: they come rounded."""
+"""The deepest level also holds this far [m] below itself, because depths in files are rounded."""
 
 
 def levels_for(name: str, axis: Array | None, depth: Range, top: float = 0.0) -> slice:
-    """The levels that a domain's depths [m] need, the first where there is no axis.
+    """Return the levels that a domain's depths [m] need; the first level if there is no axis.
 
-    InputError where it is deeper than the last, or begins above `top`, how shallow [m] the first holds.
+    InputError if the domain is deeper than the last level or begins above `top` [m], where the first level begins
+    to hold.
     """
     if axis is None:
         return slice(0, 1)
@@ -43,7 +44,7 @@ def levels_for(name: str, axis: Array | None, depth: Range, top: float = 0.0) ->
 
 
 def slots(points: Array) -> tuple[NDArray[np.uintp], float]:
-    """The table of even slots that leads to the cell of uneven points, and slots per unit."""
+    """Return a table from even slots to the cells of uneven points, and the number of slots per unit."""
     per_unit = 1 / float(np.diff(points).min())
     count = int(np.ceil((points[-1] - points[0]) * per_unit)) + 1
     starts = points[0] + np.arange(count) / per_unit
@@ -52,10 +53,10 @@ def slots(points: Array) -> tuple[NDArray[np.uintp], float]:
 
 
 def filled(values: Array) -> Array:
-    """NaN of (levels, ni, nj, 2) replaced, levels downward: by wet neighbours, the level above, then 0.
+    """Return values (levels, ni, nj, 2) without NaN: from wet neighbours, else the level above, else 0.
 
-    Interpolation beside a coast reads these cells; a zero there would slow good water. The terrain keeps
-    gliders out of them.
+    Levels go downward. Interpolation beside a coast reads these cells, and zeros there would slow open water. The
+    terrain keeps gliders out of them.
     """
     values = values.copy()
     for _ in range(HALO):
@@ -76,14 +77,15 @@ def filled(values: Array) -> Array:
 
 
 def data_end(depth: Array) -> float:
-    """How deep [m] the last of some levels holds where its column has data to the last: half a level further."""
+    """Return the depth [m] to which the last level holds if its column has data there: half a level further."""
     return max(2 * float(depth[0]), 1.0) if depth.size == 1 else float(depth[-1] + (depth[-1] - depth[-2]) / 2)
 
 
 def closed_below(wet: Bools, depth: Array, lower: Array, seabed: Array) -> Array:
-    """Height [m] below which columns of `wet` (nz, ...) levels have no data: 0 where the top level is dry.
+    """Return the height [m] below which columns of `wet` (nz, ...) levels have no data.
 
-    -inf where the data go on to the `seabed` [m, downward]. `lower` [m]: how deep each level holds.
+    0 where the top level is dry, -inf where the data go on to the `seabed` [m, downward]. `lower` [m]: the depth
+    down to which each level holds.
     """
     count = np.cumprod(wet, axis=0).sum(axis=0)
     following = np.append(depth, np.inf)[count]
@@ -102,9 +104,10 @@ def _assemble(
     spacing: float,
     clearance: float,
 ) -> tuple[OceanGrid, Seabed]:
-    """Values (times, levels, ni, nj, 2) without NaN, levels rising; a single level or time is doubled.
+    """Return the flow and the seabed from values (times, levels, ni, nj, 2) without NaN; levels rise.
 
-    `ground` (ni, nj): height of the seabed [m], -inf where it is not known; `closed`: below that no data.
+    A single level or time is doubled. `ground` (ni, nj): height of the seabed [m], -inf where unknown. `closed`
+    (ni, nj): height [m] below which there are no data.
     """
     span = (-np.inf, np.inf) if times is None else (float(times[0]), float(times[-1]))
     if times is None:
@@ -137,7 +140,7 @@ def _assemble(
 
 
 def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice, Array | None]:
-    """Which times a plan that starts at the epoch can read, and when they are [s]."""
+    """Return which times a plan that starts at the epoch can read, and these times in seconds from the epoch."""
     if isinstance(epoch, str):
         epoch = parse_time(epoch, "`flow.epoch`")
     if file.times is None or file.steady:
@@ -161,14 +164,14 @@ def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice,
 
 
 def unbroken_times(times: Times, when: np.datetime64) -> tuple[slice, str]:
-    """The run of times without gaps that holds a moment, or comes nearest; words on the gaps."""
+    """Return the run of times without gaps that holds a moment, or the nearest run, and a text on the gaps."""
     since = (times - times[0]) / np.timedelta64(1, "s")
     breaks = np.flatnonzero(gaps(since))
-    told = " and ".join(
+    listed = " and ".join(
         f"{times[n].astype('datetime64[s]')}Z to {times[n + 1].astype('datetime64[s]')}Z" for n in breaks
     )
     run, _ = unbroken(since, float((when - times[0]) / np.timedelta64(1, "s")))
-    return run, f"no data from {told}"
+    return run, f"no data from {listed}"
 
 
 def _build(
@@ -188,7 +191,7 @@ def _build(
     turn = frame.convergence(lons, lats)
     cos, sin = np.cos(turn), np.sin(turn)
 
-    # the halo has done its work once the dry cells are filled; at the file's edge there is none to drop
+    # once the dry cells are filled the halo is dropped; at the file's edge there is no halo
     kept = cut.grid.cut(file.name, lon, lat, frame.lon, margin)
     kept_i, kept_j = slice(int(kept.columns[0]), int(kept.columns[-1]) + 1), kept.rows
     count = file.u[during].shape[0]
@@ -227,11 +230,11 @@ def _build(
 def ocean_flow(
     file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None = None
 ) -> tuple[OceanGrid, Seabed]:
-    """The flow and seabed of a domain: `lon`, `lat` [degrees], `depth` [m], with a margin of two cells.
+    """Return the flow and the seabed of a domain, with a margin of two cells.
 
-    t = 0 at `epoch` (ISO 8601, UTC), which a file with several times needs. The bottom is that of the nearest
-    column, as `OceanFile.seabed` has it, or where its data end. Above the top level, and at all depths where
-    the file names none, the current is held.
+    `lon`, `lat` [degrees], `depth` [m]. t = 0 is at `epoch` (ISO 8601, UTC), which a file with several times
+    needs. The bottom at a place is the bottom of the nearest column: `OceanFile.seabed`, or where its data end.
+    The current of the top level is held above it; a file without depths is held at all depths.
     """
     return _ocean_flow(file, frame, lon, lat, depth, epoch)[:2]
 
@@ -239,9 +242,9 @@ def ocean_flow(
 def ocean_waters(
     file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None = None
 ) -> tuple[OceanGrid, Bottom]:
-    """As `ocean_flow`, and the bottom on the file's own grid."""
+    """Return the flow of a domain (see `ocean_flow`) and the bottom on the file's own grid."""
     flow, seabed, grid = _ocean_flow(file, frame, lon, lat, depth, epoch)
-    # what was taken for the bottom stands among the words on the file
+    # the file's assumptions name what was taken for the bottom
     return flow, Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own file", seabed.ground.T)
 
 
@@ -253,7 +256,8 @@ def _ocean_flow(
     error = frame.scale_error(lon, lat)
     require(
         error <= MAX_SCALE_ERROR,
-        f"the domain is too wide for a flat frame, whose metres would be {100 * error:.1f} % off; narrow it",
+        f"the domain is too wide for a flat frame, whose lengths would be wrong by {100 * error:.1f} %; make the "
+        "domain smaller",
     )
     open_somewhere = bool((seabed.bottom < -depth[0]).any())
     require(open_somewhere, f"the domain holds no water in {file.name}: every column is land, or has no data")
@@ -263,9 +267,9 @@ def _ocean_flow(
 def sample(
     file: OceanFile, lon: float, lat: float, depth: float | None = None, time: str | None = None
 ) -> tuple[float, float] | None:
-    """Current (u_east, v_north) [m/s] as the planner reads it; None where there is no water or no data.
+    """Return the current (u_east, v_north) [m/s] that the planner reads, or None without water or data.
 
-    No `depth` [m] is the surface; `time` (ISO 8601, UTC) is needed where the file holds several.
+    Without `depth` [m] it is the surface's. `time` (ISO 8601, UTC) is needed if the file holds several times.
     """
     depth = 0.0 if depth is None else float(depth)
     require(bool(np.isfinite([lon, lat, depth]).all()), f"a point must be numbers; got {lon}, {lat}, {depth}")
@@ -283,7 +287,7 @@ def sample(
             return None
         first = int(np.searchsorted(file.times, when, side="right")) - 1
         during = slice(first, first + (1 if file.times[first] == when else 2))
-        # a gap at another time is no reason to have no answer at this one
+        # a gap at another time does not matter here
         file = replace(file, times=file.times[during], u=file.u[during], v=file.v[during])
     place = file.grid.nearest_place(lon, lat)
     if place is None:
@@ -305,7 +309,7 @@ def sample(
 
 
 def _rising(axis: Any, what: str, even: bool) -> tuple[Array, int]:
-    """The axis, rising, and -1 if it had to be turned."""
+    """Return the rising axis, and -1 if it had to be reversed, else 1."""
     axis = np.atleast_1d(np.asarray(axis, dtype=np.float64))
     require(axis.ndim == 1 and bool(np.isfinite(axis).all()), f"`{what}` must be a line of numbers")
     turn = -1 if axis.size > 1 and axis[0] > axis[-1] else 1
@@ -327,11 +331,11 @@ def grid_flow(
     mask: ArrayLike | None = None,
     clearance: float = 0.0,
 ) -> tuple[OceanGrid, Seabed]:
-    """Flow and seabed from arrays on an even metric grid: x (nx), y (ny), z (nz) [m, upward], t (nt) [s].
+    """Return flow and seabed from arrays on an even metric grid: x (nx), y (ny), z (nz) [m, upward], t (nt) [s].
 
-    u, v [m/s] of shape (nt, nz, ny, nx), or (nz, ny, nx) if steady. NaN is no water, and so is True in `mask`
-    (ny, nx) or (nz, ny, nx). The bottom is the deepest level with water; where that is the last, half a level
-    further there are no data. A single level is held at all depths, and then water has no bottom.
+    u, v [m/s] have the shape (nt, nz, ny, nx), or (nz, ny, nx) if steady. There is no water where they are NaN or
+    where `mask` (ny, nx) or (nz, ny, nx) is True. The bottom is the deepest level with water; if that is the last
+    level, data end half a level below it. A single level is held at all depths, and then the water has no bottom.
     """
     (x, turn_x), (y, turn_y), (z, turn_z) = (
         _rising(x, "x", True),
@@ -372,5 +376,5 @@ def grid_flow(
     at = IndexMap(corner, 1 / width, 1 / height, *box, error=0.0)
     full = np.stack([filled(step)[::-1] for step in values])
     spacing = min(width / (x.size - 1), height / (y.size - 1))
-    one = None if times is None or times.size == 1 else times
-    return _assemble(full, z, one, at, ground, closed, spacing, clearance)
+    moments = None if times is None or times.size == 1 else times
+    return _assemble(full, z, moments, at, ground, closed, spacing, clearance)

@@ -18,32 +18,33 @@ Index = NDArray[np.intp]
 
 
 class OutsideError(InputError):
-    """A domain that lies partly outside a grid."""
+    """The domain lies partly outside a grid."""
 
 
 EARTH = 6_371_000.0
 WIDE = 5.0
-"""A spacing that is more than so many times the usual one may be a gap, between whose ends there is no data."""
+"""A spacing of more than this many times the usual spacing may be a gap. There is no data within a gap."""
 STEEP = 3.0
-"""It is one where it is also so many times the spacings beside it: a stretched axis grows by less."""
+"""It is a gap if it is also this many times the spacings beside it; a stretched axis grows more slowly."""
 EDGE = 0.01
-"""A point is on the grid up to this far beyond its ends, in cells: degrees come rounded."""
+"""A point up to this far beyond the ends [cells] is on the grid, because degrees are rounded."""
 EVEN = 1e-3
-"""An axis this close to even, in cells, is even: the rest is the rounding of its degrees."""
+"""An axis is even if its spacings differ by less than this [cells]; degrees are rounded."""
 MAP_ERROR = 1.0
-"""The index map misplaces no point of the grid by more than this [m] ..."""
+"""The index map moves no point of the grid by more than this [m] ..."""
 MAP_SIDE = 1025
-"""... unless it grows beyond this many points on a side; then a hundredth of a cell must do."""
+"""... unless the map needs more than this many points on a side; then a hundredth of a cell is enough."""
 NEWTON_STEPS = 12
-"""Newton's steps to invert a cell; three do where cells are alike."""
+"""At most this many Newton steps invert a cell; three are enough where cells are similar."""
 SETTLED = 1e-10
-"""A step of Newton's this small is the last, in cells."""
+"""Newton's method ends at a step smaller than this [cells]."""
 
 
 def gaps(axis: Array) -> Bools:
-    """Which steps (n - 1) of a rising axis are gaps: far wider than the usual one and than those beside them.
+    """Return which steps (n - 1) of a rising axis are gaps: far wider than the usual and the neighbouring steps.
 
-    At most two in a row, around a single point; more are another spacing, and the last step needs a second.
+    At most two steps in a row are gaps, around a single point; more steps are another spacing. The last step is a
+    gap only with a second one beside it.
     """
     steps = np.diff(np.asarray(axis, np.float64))
     found = np.zeros(steps.size, dtype=bool)
@@ -64,7 +65,7 @@ def gaps(axis: Array) -> Bools:
 
 
 def unbroken(axis: Array, at: float) -> tuple[slice, str]:
-    """The run of a rising axis without gaps that holds a value, or comes nearest; words on the gaps."""
+    """Return the run without gaps that holds a value, or the nearest run, and a text on the gaps."""
     breaks = np.flatnonzero(gaps(axis)) + 1
     if not breaks.size:
         return slice(0, axis.size), ""
@@ -76,14 +77,14 @@ def unbroken(axis: Array, at: float) -> tuple[slice, str]:
 
 
 def unit_vectors(lon: Array, lat: Array) -> Array:
-    """Places on the unit sphere, (..., 3): there longitudes have no seam."""
+    """Return the positions on the unit sphere, (..., 3), where longitudes have no seam."""
     phi, lam = np.radians(lat), np.radians(lon)
     return np.stack([np.cos(phi) * np.cos(lam), np.cos(phi) * np.sin(lam), np.sin(phi)], axis=-1)
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A part of a grid: its rows, its columns (in the order of the part), and the part itself."""
+    """A part of a grid: its rows, its columns (in the order of the part), and the grid of the part."""
 
     rows: slice
     columns: Index
@@ -92,7 +93,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class LonLatGrid:
-    """`lon` (nx) rises eastward, `lat` (ny) northward [degrees]."""
+    """A regular grid: `lon` (nx) rises eastward, `lat` (ny) northward [degrees]."""
 
     lon: Array
     lat: Array
@@ -108,12 +109,12 @@ class LonLatGrid:
         return (float(self.lon[0]), float(self.lon[-1])), (float(self.lat[0]), float(self.lat[-1]))
 
     def mesh(self) -> tuple[Array, Array]:
-        """Longitude and latitude of each point (ny, nx) [degrees]."""
+        """Return longitude and latitude of each point (ny, nx) [degrees]."""
         lon, lat = np.meshgrid(self.lon, self.lat)
         return lon, lat
 
     def rim(self) -> tuple[Array, Array]:
-        """Places along the edge, close together [degrees]."""
+        """Return positions along the edge, close together [degrees]."""
         share = np.linspace(0, 1, 65)
         lon = self.lon[0] + share * (self.lon[-1] - self.lon[0])
         lat = self.lat[0] + share * (self.lat[-1] - self.lat[0])
@@ -122,7 +123,7 @@ class LonLatGrid:
         return np.concatenate([lon, lon, west, east]), np.concatenate([south, north, lat, lat])
 
     def cell_sizes(self) -> tuple[Array, Array]:
-        """Sizes of cells along a row and across rows [m]: the largest along each axis."""
+        """Return the sizes of cells along a row and across rows [m]: the largest along each axis."""
         widest = np.cos(np.radians(np.abs(self.lat).min()))
         return (
             np.radians(np.diff(self.lon)) * widest * EARTH,
@@ -130,7 +131,7 @@ class LonLatGrid:
         )
 
     def nearest_place(self, lon: float, lat: float) -> tuple[float, float] | None:
-        """The place itself, or the next one on the grid if rounding put it beside; None where there is none."""
+        """Return the place, moved onto the grid if rounding put it beside; None if it lies outside."""
         _, lons = columns(self.lon, lon)
         lats = self.lat[unbroken(self.lat, lat)[0]]
         slack_lon, slack_lat = EDGE * np.diff(lons).max(initial=0), EDGE * np.diff(lats).max(initial=0)
@@ -139,7 +140,7 @@ class LonLatGrid:
         return None if off else (at_lon, at_lat)
 
     def cut(self, name: str, lon: Range, lat: Range, centre: float, margin: int) -> Cut:
-        """The part that a domain [degrees] needs, with a margin of cells; InputError where it lies outside."""
+        """Return the part that a domain [degrees] needs, with a margin of cells; InputError outside."""
         which, lons = columns(self.lon, centre)
         west, east = eastward(lon)
         middle = float(wrapped((west + east) / 2, centre))
@@ -147,27 +148,27 @@ class LonLatGrid:
         lon = (middle - half, middle + half)
         run, no_lat = unbroken(self.lat, (lat[0] + lat[1]) / 2)
         lats, no_lon = self.lat[run], unbroken(self.lon, float(wrapped(middle, float(self.lon.mean()))))[1]
-        for what, axis, bounds, none in (("longitude", lons, lon, no_lon), ("latitude", lats, lat, no_lat)):
+        for what, axis, bounds, note in (("longitude", lons, lon, no_lon), ("latitude", lats, lat, no_lat)):
             require(bounds[0] <= bounds[1], f"the domain's {what} must rise; got {bounds[0]:g} to {bounds[1]:g}")
             slack = EDGE * np.diff(axis).max() if axis.size > 1 else 0.0
             if not (axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack):
                 raise OutsideError(
                     f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
-                    f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{none}"
+                    f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{note}"
                 )
         across, within = span(lons, lon, margin), span(lats, lat, margin)
         rows = slice(within.start + run.start, within.stop + run.start)
         return Cut(rows, which[across], LonLatGrid(lons[across], self.lat[rows]))
 
     def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:
-        """Fractional indices (column, row) of places in a frame [m], (..., 2); straight on beyond the ends."""
+        """Return fractional indices (column, row), (..., 2), of places in a frame [m]; linear beyond the ends."""
         lon, lat = frame.to_lonlat(x, y)
         return np.stack([_fraction(self.lon, lon), _fraction(self.lat, lat)], axis=-1)
 
 
 @dataclass(frozen=True)
 class CurvedGrid:
-    """`lon`, `lat` (ny, nx) [degrees] of each point; neighbours in the file are neighbours in the sea."""
+    """A curved grid: `lon`, `lat` (ny, nx) [degrees]; points that are neighbours in the file are so at sea."""
 
     lon: Array
     lat: Array
@@ -179,7 +180,7 @@ class CurvedGrid:
 
     @property
     def bounds(self) -> tuple[Range, Range]:
-        """West and east, south and north [degrees], of the smallest arc that holds all."""
+        """West and east, south and north [degrees], of the smallest arc that holds all points."""
         lon = np.sort(self.lon.ravel() % 360)
         gaps = np.append(np.diff(lon), lon[0] + 360 - lon[-1])
         widest = int(gaps.argmax())
@@ -187,16 +188,16 @@ class CurvedGrid:
         return (west, west + 360 - float(gaps[widest])), (float(self.lat.min()), float(self.lat.max()))
 
     def mesh(self) -> tuple[Array, Array]:
-        """As LonLatGrid says."""
+        """See LonLatGrid."""
         return self.lon, self.lat
 
     def rim(self) -> tuple[Array, Array]:
-        """As LonLatGrid says."""
+        """See LonLatGrid."""
         edge = (np.s_[0, :], np.s_[-1, :], np.s_[:, 0], np.s_[:, -1])
         return np.concatenate([self.lon[e] for e in edge]), np.concatenate([self.lat[e] for e in edge])
 
     def cell_sizes(self) -> tuple[Array, Array]:
-        """As LonLatGrid says."""
+        """See LonLatGrid."""
         at = self._vectors
         return (
             EARTH * np.linalg.norm(np.diff(at, axis=1), axis=-1).ravel(),
@@ -208,7 +209,7 @@ class CurvedGrid:
         return unit_vectors(self.lon, self.lat)
 
     def nearest_place(self, lon: float, lat: float) -> tuple[float, float] | None:
-        """As LonLatGrid says."""
+        """See LonLatGrid."""
         near = self._box(np.array([lon]), np.array([lat]), 3)
         part = CurvedGrid(self.lon[near], self.lat[near])
         frame = LocalFrame(lon, lat)
@@ -216,7 +217,7 @@ class CurvedGrid:
         last = np.array(part.shape[::-1]) - 1.0
         inside = bool((at >= -EDGE).all() and (at <= last + EDGE).all())
         inside &= bool(self._open(at, (near[0].start, near[1].start)))
-        # a part's edge within the grid lies three cells away
+        # the part reaches three cells around the place
         return (lon, lat) if inside else None
 
     @cached_property
@@ -226,20 +227,20 @@ class CurvedGrid:
         result = np.zeros((self.shape[0] - 1, self.shape[1] - 1), dtype=bool)
         for axis in (0, 1):
             steps = np.linalg.norm(np.diff(at, axis=axis), axis=-1)
-            # along the middle row or column; a gap goes through all of them
+            # one look along the middle row or column is enough: a gap crosses all of them
             middle = np.moveaxis(steps, axis, 0)[:, steps.shape[1 - axis] // 2]
             for n in np.flatnonzero(gaps(np.concatenate([[0.0], np.cumsum(middle)]))):
                 result[(n, slice(None)) if axis == 0 else (slice(None), n)] = True
         return result
 
     def _open(self, at: Array, first: tuple[int, int]) -> Bools:
-        """Whether fractional indices (..., 2) of a part that begins at `first` (row, column) lie in no gap."""
+        """Return whether indices (..., 2) lie outside gaps; they count from `first` (row, column) of the grid."""
         cell = np.floor(at).astype(np.int64) + np.array(first[::-1])
         i, j = (np.clip(cell[..., n], 0, self.shape[1 - n] - 2) for n in range(2))
         return np.asarray(~self._gaps[j, i])
 
     def _box(self, lon: Array, lat: Array, margin: int) -> tuple[slice, slice]:
-        """The rows and columns about the points nearest to some places."""
+        """Return the rows and columns about the points nearest to some places."""
         tree = KDTree(self._vectors.reshape(-1, 3))
         nearest = np.asarray(tree.query(unit_vectors(lon, lat))[1])
         j, i = np.unravel_index(nearest, self.shape)
@@ -250,7 +251,10 @@ class CurvedGrid:
         return rows, across
 
     def cut(self, name: str, lon: Range, lat: Range, centre: float, margin: int) -> Cut:
-        """As LonLatGrid says; columns are not joined across a seam of the file."""
+        """Return the part that a domain [degrees] needs, with a margin of cells; InputError outside.
+
+        Columns are not joined across a seam of the file.
+        """
         west, east = eastward(lon)
         require(lat[0] <= lat[1], f"the domain's latitude must rise; got {lat[0]:g} to {lat[1]:g}")
         at_lon, at_lat = np.meshgrid(np.linspace(west, east, 33), np.linspace(*lat, 33))
@@ -274,7 +278,10 @@ class CurvedGrid:
         return Cut(rows, np.arange(self.shape[1])[across], part)
 
     def indices(self, frame: LocalFrame, x: Array, y: Array) -> Array:
-        """As LonLatGrid says: the inverse of the bilinear map of the cell, by Newton's method."""
+        """Return fractional indices (column, row), (..., 2), of places in a frame [m]; linear beyond the ends.
+
+        Newton's method inverts the bilinear map of the cell.
+        """
         shape = np.shape(x)
         to = np.stack([np.ravel(x), np.ravel(y)], axis=-1)
         at = np.stack(frame.to_local(self.lon, self.lat), axis=-1)
@@ -284,7 +291,7 @@ class CurvedGrid:
         for _ in range(NEWTON_STEPS):
             cell_j = np.clip(np.floor(j), 0, last_j).astype(np.intp)
             cell_i = np.clip(np.floor(i), 0, last_i).astype(np.intp)
-            # beyond the rim the cell is held straight: its twist would fold far away
+            # beyond the rim the cell is extended straight: its twist would fold far away
             b, a = np.clip(j - cell_j, 0, 1)[:, None], np.clip(i - cell_i, 0, 1)[:, None]
             p00, p10 = at[cell_j, cell_i], at[cell_j + 1, cell_i]
             p01, p11 = at[cell_j, cell_i + 1], at[cell_j + 1, cell_i + 1]
@@ -307,7 +314,7 @@ Grid = LonLatGrid | CurvedGrid
 
 
 def grid_of(lon: Array, lat: Array) -> Grid:
-    """The grid of axes (nx), (ny), or of places (ny, nx): regular where these are no more than axes."""
+    """Return a regular grid of axes (nx), (ny), or of positions (ny, nx) that are axes; else a curved grid."""
     if lon.ndim == 1:
         return LonLatGrid(lon, lat)
     if min(lon.shape) < 2:
@@ -323,7 +330,7 @@ def grid_of(lon: Array, lat: Array) -> Grid:
 
 
 def columns(lon: Array, centre: float) -> tuple[Index, Array]:
-    """Indices and longitudes of the unbroken run of columns about `centre`, west to east, modulo 360.
+    """Return indices and longitudes of the columns without gaps about `centre`, west to east, modulo 360.
 
     Longitudes are within 180 degrees of the centre; a file that circles the globe has no seam there.
     """
@@ -338,14 +345,14 @@ def columns(lon: Array, centre: float) -> tuple[Index, Array]:
 
 
 def span(axis: Array, bounds: Range, margin: int) -> slice:
-    """Two points or more: the cells that hold the bounds, and a margin where there is one."""
+    """Return the points of the cells that hold the bounds, with a margin if there is one; at least two points."""
     first = max(0, min(int(np.searchsorted(axis, bounds[0], side="right")) - 1, axis.size - 2))
     last = max(first + 1, min(int(np.searchsorted(axis, bounds[1], side="left")), axis.size - 1))
     return slice(max(0, first - margin), min(axis.size, last + margin + 1))
 
 
 def _fraction(axis: Array, at: Array) -> Array:
-    """Fractional index of values on a rising axis, straight on beyond its ends."""
+    """Return the fractional index of values on a rising axis; linear beyond its ends."""
     even = np.linspace(axis[0], axis[-1], axis.size)
     step = (axis[-1] - axis[0]) / (axis.size - 1)
     if np.abs(axis - even).max() <= EVEN * step:
@@ -358,7 +365,7 @@ def _fraction(axis: Array, at: Array) -> Array:
 class IndexMap:
     """The file's fractional indices at even points of the frame, as `OceanGrid` describes them.
 
-    `error` [m]: how far reading between the points misplaces a point of the grid, at worst.
+    `error` [m]: the largest error in position of a grid point that is read between the points.
     """
 
     index_map: Array
@@ -372,9 +379,9 @@ class IndexMap:
 
 
 def index_map(frame: LocalFrame, grid: Grid) -> IndexMap:
-    """The map of a grid, as fine as MAP_ERROR asks."""
+    """Return the map of a grid, as fine as MAP_ERROR asks."""
     x, y = frame.to_local(*grid.rim())
-    # the rim bulges a little between the points above
+    # between the points above the rim may reach further out
     pad_x, pad_y = 0.01 * np.ptp(x), 0.01 * np.ptp(y)
     x_lo, x_hi, y_lo, y_hi = x.min() - pad_x, x.max() + pad_x, y.min() - pad_y, y.max() + pad_y
     along, across = grid.cell_sizes()
@@ -405,7 +412,8 @@ def index_map(frame: LocalFrame, grid: Grid) -> IndexMap:
         side = 2 * side - 1
     require(
         error <= max(MAP_ERROR, 0.01 * cells.min()),
-        f"the grid is too uneven or too near a pole for a flat frame: points would be read {error:.0f} m off",
+        f"the grid is too uneven or too near a pole for a flat frame: positions would be wrong by {error:.0f} m; "
+        "plan in a smaller area",
     )
     return IndexMap(
         np.ascontiguousarray(known),

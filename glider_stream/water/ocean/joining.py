@@ -1,4 +1,4 @@
-"""The parts of one or several files made one: u and v on one grid, toward true east and north."""
+"""Joins the parts of one or several files: u and v on one grid, toward true east and north."""
 
 import math
 from dataclasses import replace
@@ -22,7 +22,7 @@ from .stagger import AGREES, collocated, half_a_cell_on, row_angle, same_points,
 
 Values = NDArray[np.float32]
 LITTLE = math.radians(0.1)
-"""A grid turned by less [rad] reads the same either way: 0.5 mm/s in 0.3 m/s."""
+"""A grid that is rotated by less than this [rad] counts as not rotated: 0.5 mm/s in 0.3 m/s."""
 
 
 def _same(a: NDArray[Any] | None, b: NDArray[Any] | None) -> bool:
@@ -36,7 +36,7 @@ def _same(a: NDArray[Any] | None, b: NDArray[Any] | None) -> bool:
 
 
 def _stacked(name: str, parts: list[Part]) -> Part:
-    """The parts of one component, one after the other in time."""
+    """Return the parts of one component joined in time."""
     first = parts[0]
     for part in parts[1:]:
         same = _same(part.levels.depth, first.levels.depth) and same_points(part.grid.mesh(), first.grid.mesh())
@@ -50,8 +50,8 @@ def _stacked(name: str, parts: list[Part]) -> Part:
     known = [part.times for part in parts if part.times is not None]
     require(
         len(known) == len(parts),
-        f"{name}: of several files, each must say its time; at least one does not: if each holds one step, name "
-        "`origin`, the date of the first, and `step`, the hours from file to file, in `names`",
+        f"{name}: each of several files must hold its time, and at least one does not; if each holds one step, "
+        "set `origin` (the date of the first) and `step` (the hours from file to file) in `names`",
     )
     times, values = np.concatenate(known), np.concatenate([part.values for part in parts])
     rank = np.argsort(times, kind="stable")
@@ -63,20 +63,20 @@ def _stacked(name: str, parts: list[Part]) -> Part:
     return replace(first, times=times[rank], values=values[rank], notes=notes, deeper=deeper)
 
 
-def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
-    """One set of currents out of the parts: in the order of time, u and v on one grid, east and north."""
+def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
+    """Return the currents of all parts: in the order of time, u and v on one grid, toward east and north."""
     name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
     both = []
     for component, toward in (("u", "east"), ("v", "north")):
-        own = [part for part in parts if part.component == component]
-        require(len(own) > 0, f"{name} holds no current toward {toward}; name the file that does, too")
-        both.append(_stacked(name, own))
+        matching = [part for part in parts if part.component == component]
+        require(len(matching) > 0, f"{name} holds no current toward {toward}; also name the file that does")
+        both.append(_stacked(name, matching))
     east, north = both
     require(_same(east.times, north.times), f"{name}: east and north currents are given at different times")
-    moments = _stamped(name, east.times, said)
+    moments = _stamped(name, east.times, names)
     levels = _levels_of_both(name, east, north)
     notes = list(dict.fromkeys(note for part in both for note in part.notes))
-    grid, u, v, deeper, more = _together(name, east, north, said)
+    grid, u, v, deeper, more = _together(name, east, north, names)
     notes += more
 
     missing = np.isnan(u) | np.isnan(v)
@@ -84,7 +84,7 @@ def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
     depth = _model_depth(east, north, grid)
     known = None if depth is None else np.isfinite(depth)
     zeros = both_still(east.zeros, north.zeros)
-    found = mark_land(name, u, v, deeper, zeros, known, said.zeros)
+    found = mark_land(name, u, v, deeper, zeros, known, names.zeros)
     notes += found
     data = np.isfinite(u)
     wet, ever = np.asarray(data.all(axis=0)), np.asarray(data.any(axis=0))
@@ -93,9 +93,9 @@ def joined(paths: list[Path], parts: list[Part], said: Names) -> OceanFile:
         notes.append(
             f"{100 * gaps / ever.sum():.1f} % of the wet points have gaps in time; plans keep out of these"
         )
-    surface = levels.depth is None or check_hold(name, said.hold, levels)
+    surface = levels.depth is None or check_hold(name, names.hold, levels)
     if levels.depth is None:
-        notes.append("the file names no depth: its current is taken as the surface's and held at all depths")
+        notes.append("the file has no depth: its current is taken as the surface's and held at all depths")
     elif surface:
         notes.append(f"its one level, at {levels.depth[0]:g} m, is held at all depths, as you say")
     if moments is None or moments.size == 1:
@@ -131,7 +131,7 @@ def _assumed(
     zeros: Evidence,
     found: list[str],
 ) -> dict[str, str]:
-    """What was assumed of bottom, land, levels and times, in a few words each."""
+    """Return short texts on what was assumed about bottom, land, levels and times."""
     field = east.fields.get("seabed")
     if depth is not None and field is not None:
         bottom = f"the model's depth `{field.name}`"
@@ -160,42 +160,45 @@ def _assumed(
     }
 
 
-def _stamped(name: str, times: Times | None, said: Names) -> Times | None:
-    """Times moved to the middle of their intervals, by the user's word; in order, none given twice."""
+def _stamped(name: str, times: Times | None, names: Names) -> Times | None:
+    """Return the times, moved to the middle of their intervals if the user sets `stamps`.
+
+    InputError if a time repeats.
+    """
     if times is None or times.size < 2:
         require(
-            said.stamps is None or said.stamps == "middle",
-            f"`stamps` = {said.stamps!r} needs two times to tell the interval of {name}, which has fewer",
+            names.stamps is None or names.stamps == "middle",
+            f"`stamps` = {names.stamps!r} needs two times to tell the interval of {name}, which has fewer",
         )
         return times
     again = times[1:][np.diff(times) <= np.timedelta64(0, "ms")]
     require(again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap")
     steps = np.diff(times)
-    if said.stamps == "start":
+    if names.stamps == "start":
         return np.asarray(times + np.append(steps, steps[-1]) // 2)
-    if said.stamps == "end":
+    if names.stamps == "end":
         return np.asarray(times - np.append(steps[:1], steps) // 2)
     return times
 
 
 def _levels_of_both(name: str, east: Part, north: Part) -> Levels:
-    """The levels of both components, which must be the same."""
+    """Return the levels of both components; InputError if they differ."""
     if _same(east.levels.depth, north.levels.depth):
         return east.levels
     raise InputError(f"{name}: the currents are given at different depths; bring them onto the same levels first")
 
 
 def _together(
-    name: str, east: Part, north: Part, said: Names
+    name: str, east: Part, north: Part, names: Names
 ) -> tuple[Grid, Values, Values, tuple[Values, Values] | None, list[str]]:
-    """u and v on one grid, toward true east and north, and so what lies below the levels; notes."""
-    grid, u, v, staggered = _on_one_grid(name, east, north, said)
-    notes = ["u and v lie on points of their own (a C-grid): brought to the cells' centres"] if staggered else []
+    """Return the grid, u and v toward true east and north, the same for the levels below, and notes."""
+    grid, u, v, staggered = _on_one_grid(name, east, north, names)
+    notes = ["u and v lie on different points (a C-grid): brought to the cells' centres"] if staggered else []
     u, v, more = _toward_east(name, grid, east, north, u, v, staggered)
     deeper = None
     if east.deeper is not None and north.deeper is not None:
         below = replace(east, values=east.deeper), replace(north, values=north.deeper)
-        _, down_u, down_v, _ = _on_one_grid(name, *below, said)
+        _, down_u, down_v, _ = _on_one_grid(name, *below, names)
         down_u, down_v, _ = _toward_east(name, grid, *below, down_u, down_v, staggered)
         gone = np.isnan(down_u) | np.isnan(down_v)
         deeper = np.where(gone, np.float32(np.nan), down_u), np.where(gone, np.float32(np.nan), down_v)
@@ -203,7 +206,7 @@ def _together(
 
 
 def _model_depth(east: Part, north: Part, grid: Grid) -> Array | None:
-    """The model's own depth (ny, nx) [m, downward] at the grid's points, NaN where it is not known."""
+    """Return the model's own depth (ny, nx) [m, downward] at the grid's points, NaN where it is unknown."""
     first, second = east.fields.get("seabed"), north.fields.get("seabed")
     if first is None:
         return None
@@ -215,7 +218,10 @@ def _model_depth(east: Part, north: Part, grid: Grid) -> Array | None:
 def _seabed(
     ever: Bools, deeper: tuple[Values, Values] | None, levels: Levels, depth: Array | None, surface: bool
 ) -> tuple[Array, list[str]]:
-    """Depth of the seabed (ny, nx) [m]: the model's own, else by the deepest level with data; inf if unknown."""
+    """Return the depth of the seabed (ny, nx) [m], inf where unknown, and notes.
+
+    It is the model's own depth, else the depth of the deepest level with data.
+    """
     wet = ever if deeper is None else np.concatenate([ever, np.isfinite(deeper[0][0])])
     count = np.cumprod(wet, axis=0).sum(axis=0)
     if surface or levels.every is None:
@@ -226,7 +232,7 @@ def _seabed(
     if depth is None:
         return found, []
     if levels.sigma is not None:
-        # cut to their upper or lower levels, they still say how deep it is
+        # even a part of the levels says how deep the sea is
         return np.where((count > 0) | (np.isfinite(depth) & ~levels.sigma.whole), depth, 0.0), []
     unlike = (count > 0) & np.isnan(depth)
     notes = []
@@ -237,20 +243,24 @@ def _seabed(
     return np.where((count > 0) & np.isfinite(depth), depth, found), notes
 
 
-def _on_one_grid(name: str, east: Part, north: Part, said: Names) -> tuple[Grid, Values, Values, bool]:
-    """u and v at the same points; whether they were brought there."""
+def _on_one_grid(name: str, east: Part, north: Part, names: Names) -> tuple[Grid, Values, Values, bool]:
+    """Return the grid, u and v at the same points, and whether they were moved there."""
     u_at, v_at = east.grid.mesh(), north.grid.mesh()
-    if said.stagger == "nemo":
-        require(east.grid.shape == north.grid.shape, f"{name}: u and v differ in shape; `stagger` cannot be nemo")
+    if names.stagger == "nemo":
+        require(
+            east.grid.shape == north.grid.shape,
+            f"{name}: u and v have different shapes, so `stagger` cannot be nemo; leave it out",
+        )
         lon, lat, u, v = half_a_cell_on(u_at, east.values, north.values)
         return grid_of(lon, lat), u, v, True
     if same_points(u_at, v_at):
         apart = {"depthu", "depthv"} <= {east.levels.name.lower(), north.levels.name.lower()}
-        if apart and said.stagger is None:
+        if apart and names.stagger is None:
             raise InputError(
                 f"`{east.variable}`, `{north.variable}` of {name} are of a staggered grid (depthu, depthv), "
-                'but at the same longitudes: name `stagger` in `names`, "nemo" if these are the cells\' centres, '
-                '"none" if both were brought there'
+                'but at the same longitudes: set `stagger` in `names`, "nemo" if these longitudes are of the '
+                "cells' centres, "
+                '"none" if u and v were both moved there'
             )
         return east.grid, east.values, north.values, False
     lon, lat, u, v = collocated(name, u_at, v_at, east.values, north.values)
@@ -260,7 +270,10 @@ def _on_one_grid(name: str, east: Part, north: Part, said: Names) -> tuple[Grid,
 def _toward_east(
     name: str, grid: Grid, east: Part, north: Part, u: Values, v: Values, staggered: bool
 ) -> tuple[Values, Values, list[str]]:
-    """The components turned, where they run along a grid that is; refused where that is not said."""
+    """Return u and v rotated to east and north if they run along the grid, and notes.
+
+    InputError if the file does not say along what they run.
+    """
     ways = {east.way, north.way}
     lon, lat = grid.mesh()
     along = staggered or "grid" in ways
@@ -268,33 +281,33 @@ def _toward_east(
         return u, v, []
     angle = row_angle(name, lon, lat, east.signs) if along or "unsure" in ways else np.zeros(lon.shape)
     field = east.fields.get("angle") or north.fields.get("angle")
-    told = None if field is None else field.at(lon, lat)
-    if told is not None and field is not None:
-        # the angle of land is often a zero, and no matter
-        off = np.abs(np.angle(np.exp(1j * (told - angle))))[np.isfinite(u).any(axis=(0, 1))]
+    given = None if field is None else field.at(lon, lat)
+    if given is not None and field is not None:
+        # the angle on land is often zero and does not matter
+        off = np.abs(np.angle(np.exp(1j * (given - angle))))[np.isfinite(u).any(axis=(0, 1))]
         require(
             off.size == 0 or float(np.quantile(off, 0.95)) < AGREES,
-            f"`{field.name}` of {name} is not the angle from east to the grid's rows, which lie up to "
-            f"{math.degrees(float(off.max(initial=0))):.0f} degrees elsewhere: name `rotate` in `names`, "
+            f"`{field.name}` of {name} is not the angle from east to the grid's rows; it differs by up to "
+            f"{math.degrees(float(off.max(initial=0))):.0f} degrees: set `rotate` in `names`, "
             '"grid" to follow the rows',
         )
-        angle = told
+        angle = given
     most = float(np.abs(angle).max())
     if most < LITTLE:
         return u, v, []
-    if ways == {"east"} or ("unsure" in ways and not along and told is None):
+    if ways == {"east"} or ("unsure" in ways and not along and given is None):
         raise InputError(
             f"`{east.variable}` and `{north.variable}` of {name} do not say whether they run toward east and "
             f"north or along the grid's rows, which leave east by up to {math.degrees(most):.0f} degrees: "
-            'name `rotate` in `names`, "none" or "grid"'
+            'set `rotate` in `names`, "none" or "grid"'
         )
-    by = "the grid's own geometry" if told is None or field is None else f"`{field.name}`"
+    by = "the grid's own geometry" if given is None or field is None else f"`{field.name}`"
     u, v = turned(u, v, angle)
-    return u, v, [f"turned to true east and north by {by}, by up to {math.degrees(most):.1f} degrees"]
+    return u, v, [f"rotated to true east and north by {by}, by up to {math.degrees(most):.1f} degrees"]
 
 
 def _seabed_at(first: Field, second: Field | None, grid: Grid) -> Array:
-    """The model's own depth at the grid's points: the mean of what the components next to it have."""
+    """Return the model's own depth at the grid's points: the mean of the depths at the components beside them."""
     lon, lat = grid.mesh()
     found = []
     for field in (first, second):
@@ -303,8 +316,8 @@ def _seabed_at(first: Field, second: Field | None, grid: Grid) -> Array:
         tree = KDTree(unit_vectors(field.lon, field.lat))
         off, near = map(np.asarray, tree.query(unit_vectors(lon, lat).reshape(-1, 3), k=2))
         # the point itself, or the two that it lies between
-        own = off[:, 0] < 0.1 * off[:, 1]
-        value = np.where(own, field.values[near[:, 0]], field.values[near].mean(axis=1))
+        exact = off[:, 0] < 0.1 * off[:, 1]
+        value = np.where(exact, field.values[near[:, 0]], field.values[near].mean(axis=1))
         found.append(value.reshape(lon.shape))
     return np.asarray(np.nanmean(found, axis=0))
 

@@ -1,4 +1,4 @@
-"""Land in current files: masks, fills that are not declared, and zeros."""
+"""Finds land in current files: masks, fill values that are not declared, and zeros."""
 
 import re
 from dataclasses import dataclass
@@ -15,11 +15,14 @@ from .names import Names, standard_name
 Values = NDArray[np.float32]
 
 NO_DATA = 1e3
-"""No unit of a current makes such a number: a fill that the file does not declare."""
+"""Numbers above this are fill values that the file does not declare: no unit of a current gives such a number."""
 FASTEST = 9.0
-"""No ocean current is as fast [m/s]: a fill, or another unit."""
+"""No ocean current is as fast as this [m/s]: a faster value is a fill value or has another unit."""
 ALONE = 2
-"""So many neighbouring points of exactly 0 m/s are calm, as a radar measures it; more are written so."""
+"""Up to this many neighbouring points of exactly 0 m/s are calm water, as a radar measures it.
+
+Larger patches of zeros are land.
+"""
 SEA_IS_ONE = re.compile(
     r"^([tuv]mask(util)?|mask_(rho|u|v|t)|wet(_[cuvt])?|sea_binary_mask|sea_mask)$", re.IGNORECASE
 )
@@ -27,23 +30,29 @@ LAND_IS_ONE = re.compile(r"^(land_binary_mask|land_mask|landmask)$", re.IGNORECA
 EITHER = re.compile(r"^(mask|lsm|land_sea_mask|landsea|binary_mask)$", re.IGNORECASE)
 
 
-def mask_of(name: str, data: Any, said: Names, variable: Any, component: str) -> tuple[Any, float | None] | None:
-    """A mask on the points of a variable, and its value on land, None where nobody says; or no mask.
+def mask_of(name: str, data: Any, names: Names, variable: Any, component: str) -> tuple[Any, float | None] | None:
+    """Return a mask on the points of a variable and its value on land, or None if there is no mask.
 
-    A user's word first, then what the mask itself says, then where the current is not zero.
+    The value is None if it is unknown. The order of trust: the user's setting, the mask's own attributes, the
+    points where the current is not zero.
     """
-    if said.mask == "none":
+    if names.mask == "none":
         return None
-    if said.mask is not None:
-        there = said.mask in data.variables
-        require(there, f'{name} holds no mask `{said.mask}`; name one of it, or "none", in `names`')
-    names = [said.mask] if said.mask else [str(n) for n in data.variables if _is_mask(str(n), data[n], component)]
-    for one in (data[n] for n in names):
-        extra = [dim for dim in one.dims if dim not in variable.dims]
-        fits = len(one.dims) - len(extra) >= 2 and all(one.sizes[dim] == 1 for dim in extra)
+    if names.mask is not None:
+        exists = names.mask in data.variables
+        require(
+            exists,
+            f'{name} holds no mask `{names.mask}`; set `mask` in `names` to one of its variables, or to "none"',
+        )
+    candidates = (
+        [names.mask] if names.mask else [str(n) for n in data.variables if _is_mask(str(n), data[n], component)]
+    )
+    for mask in (data[n] for n in candidates):
+        extra = [dim for dim in mask.dims if dim not in variable.dims]
+        fits = len(mask.dims) - len(extra) >= 2 and all(mask.sizes[dim] == 1 for dim in extra)
         if fits:
-            one = one.isel(dict.fromkeys(extra, 0))
-            return one, float(said.land) if said.land is not None else _on_land(one, variable)
+            mask = mask.isel(dict.fromkeys(extra, 0))
+            return mask, float(names.land) if names.land is not None else _on_land(mask, variable)
     return None
 
 
@@ -63,10 +72,10 @@ def _on_land(mask: Any, variable: Any) -> float | None:
         return 0.0
     if standard == "land_binary_mask" or LAND_IS_ONE.match(name):
         return 1.0
-    words = str(mask.attrs.get("flag_meanings", "")).lower().split()
+    meanings = str(mask.attrs.get("flag_meanings", "")).lower().split()
     flags = np.ravel(mask.attrs.get("flag_values", []))
-    if len(words) == len(flags) == 2 and sum("land" in word for word in words) == 1:
-        return float(flags[next(n for n, word in enumerate(words) if "land" in word)])
+    if len(meanings) == len(flags) == 2 and sum("land" in word for word in meanings) == 1:
+        return float(flags[next(n for n, word in enumerate(meanings) if "land" in word)])
     first = {dim: 0 for dim in variable.dims if dim not in mask.dims}
     speed = np.abs(np.nan_to_num(np.asarray(variable.isel(first).transpose(*mask.dims).values, np.float64)))
     here = np.asarray(mask.values, np.float64)
@@ -77,7 +86,7 @@ def _on_land(mask: Any, variable: Any) -> float | None:
 
 
 def clear_marks(file: str, name: str, values: Values, factor: float | None) -> tuple[Values, tuple[str, ...]]:
-    """In m/s, NaN where there is no data; what was found."""
+    """Return values in m/s, NaN where there is no data, and a note on fill values that were found."""
     values = np.where(np.abs(values) > NO_DATA, np.float32(np.nan), values)
     values *= np.float32(factor or 1.0)
     beyond = np.abs(values) > FASTEST
@@ -96,10 +105,11 @@ def clear_marks(file: str, name: str, values: Values, factor: float | None) -> t
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a file says of its zeros, wherever a domain is cut: `still` (ny, nx) is its whole uppermost level.
+    """How a file uses zeros; this does not depend on the domain.
 
-    `still`: where the current is exactly 0 at the first time; `fills`: whether a point of it has no value;
-    `masked`: dimensions of the mask that was used, 0 if none; `levels`: how many the file has.
+    `still` (ny, nx): where the current of the whole uppermost level is exactly 0 at the first time. `fills`:
+    whether a point of that level has no value. `masked`: the number of dimensions of the mask that was used, 0
+    without a mask. `levels`: the number of levels in the file.
     """
 
     still: Bools
@@ -108,48 +118,48 @@ class Evidence:
     levels: int
 
     def patch(self) -> int:
-        """Points of the largest patch of zeros: calm is measured here and there, land is wide."""
+        """Return the number of points in the largest patch of zeros; calm water is scattered, land is wide."""
         from scipy.ndimage import label
 
         patches, count = label(self.still, structure=np.ones((3, 3)))
         return int(np.bincount(patches.ravel())[1:].max()) if count else 0
 
     def wide(self) -> bool:
-        """Whether a patch of zeros holds three by three points."""
+        """Return whether a patch of zeros holds three by three points."""
         from scipy.ndimage import binary_erosion
 
         return bool(binary_erosion(self.still, structure=np.ones((3, 3), dtype=bool)).any())
 
 
-def both_still(one: Evidence, other: Evidence) -> Evidence:
-    """Where both components are 0; of a staggered grid the rows and columns that both have."""
-    ny, nx = (min(a, b) for a, b in zip(one.still.shape, other.still.shape, strict=True))
-    still = one.still[:ny, :nx] & other.still[:ny, :nx]
-    fewest = min(one.masked, other.masked)
-    return Evidence(still, one.fills or other.fills, fewest, max(one.levels, other.levels))
+def both_still(first: Evidence, second: Evidence) -> Evidence:
+    """Return the evidence where both components are 0; on a staggered grid, on their common rows and columns."""
+    ny, nx = (min(a, b) for a, b in zip(first.still.shape, second.still.shape, strict=True))
+    still = first.still[:ny, :nx] & second.still[:ny, :nx]
+    fewest = min(first.masked, second.masked)
+    return Evidence(still, first.fills or second.fills, fewest, max(first.levels, second.levels))
 
 
-def _columns_of_land(name: str, still: Bools, evidence: Evidence, said: str | None) -> tuple[Bools, list[str]]:
-    """Which columns (ny, nx), still at all times and depths, are land; what was assumed."""
-    none = np.zeros_like(still)
+def _columns_of_land(name: str, still: Bools, evidence: Evidence, zeros: str | None) -> tuple[Bools, list[str]]:
+    """Return which of the columns (ny, nx) that never move are land, and notes on what was assumed."""
+    nowhere = np.zeros_like(still)
     count = int(still.sum())
-    if count == 0 or said == "calm":
-        return none, [f"{count} columns without any current are calm water, as you say"] if count else []
-    if said == "land":
+    if count == 0 or zeros == "calm":
+        return nowhere, [f"{count} columns without any current are calm water, as you say"] if count else []
+    if zeros == "land":
         return still, [f"{count} columns without any current are land, as you say"]
     if evidence.masked:
-        return none, [f"{count} columns without any current are open by the mask: taken as calm water"]
+        return nowhere, [f"{count} columns without any current are water by the mask: taken as calm water"]
     if evidence.levels < 2 and evidence.fills and evidence.wide():
         raise InputError(
             f"{name} holds both missing values and wide patches of exactly 0 m/s ({evidence.patch()} points "
-            'together), which may be land or calm water: name `zeros` in `names`, "land" or "calm"'
+            'together), which may be land or calm water: set `zeros` in `names`, "land" or "calm"'
         )
-    few = 'calm water: they lie apart from each other; name `zeros` = "land" in `names` if they are land'
+    few = 'calm water: they lie apart from each other; set `zeros` = "land" in `names` if they are land'
     if evidence.patch() <= ALONE or (evidence.levels < 2 and evidence.fills):
-        return none, [f"{count} columns of exactly 0 m/s are taken as {few}"]
+        return nowhere, [f"{count} columns of exactly 0 m/s are taken as {few}"]
     return still, [
         f"{count} columns with no current at any time or depth are taken as land; "
-        'name `zeros` = "calm" in `names` if they are water'
+        'set `zeros` = "calm" in `names` if they are water'
     ]
 
 
@@ -160,14 +170,14 @@ def mark_land(
     deeper: tuple[Values, Values] | None,
     evidence: Evidence,
     known: Bools | None,
-    said: str | None,
+    zeros_are: str | None,
 ) -> list[str]:
-    """NaN, in place, where land and seabed are written as zeros; notes on what was assumed.
+    """Set u and v to NaN, in place, where land and seabed are written as zeros; return notes.
 
-    u, v (nt, nz, ny, nx) and the levels below them, `deeper` (1, n, ny, nx) each. A column without any current
-    is land by what the file's zeros look like (`evidence`). Zeros from some level down to the last one of the
-    file are seabed, column by column: what a fill says elsewhere says nothing here. Not where a fill lies
-    beneath them, nor where the model's depth is `known` (ny, nx): there the seabed has another mark.
+    u, v (nt, nz, ny, nx) are the levels that were read, `deeper` (1, n, ny, nx) the levels below them. `evidence`
+    decides whether a column without any current is land. Zeros from some level down to the last level of the file
+    are seabed, column by column. This does not hold where a fill value lies below the zeros or where the model's
+    depth is `known` (ny, nx): there the seabed is marked in another way.
     """
     blocks = [(u, v)] if deeper is None else [(u, v), deeper]
     parts = []
@@ -180,11 +190,11 @@ def mark_land(
         parts.append((still, held))
     still, held = (np.concatenate([part[n] for part in parts]) for n in range(2))
     whole = np.asarray(still.all(axis=0) & held.any(axis=0))
-    land, notes = _columns_of_land(name, whole, evidence, said)
+    land, notes = _columns_of_land(name, whole, evidence, zeros_are)
     under = np.cumprod((still & held)[::-1], axis=0)[::-1].astype(bool) & ~whole
     if known is not None:
         under &= ~known
-    if evidence.masked > 2 or evidence.levels < 2 or said == "calm":
+    if evidence.masked > 2 or evidence.levels < 2 or zeros_are == "calm":
         under[:] = False
     dry = under | land
     levels = u.shape[1]
@@ -193,6 +203,6 @@ def mark_land(
     if under.any():
         notes.append(
             f"{int(under.sum())} points with no current at any time, down to the last level, are taken as "
-            'seabed; name `zeros` = "calm" in `names` if they are water'
+            'seabed; set `zeros` = "calm" in `names` if they are water'
         )
     return notes

@@ -19,17 +19,18 @@ FACES = re.compile(
 )
 """Names of the depths between which the levels of a model lie."""
 HELD_ABOVE = 20.0
-"""A top level this near the surface [m] stands for the water above it, too; or half a level's spacing."""
+"""A top level this near to the surface [m] also stands for the water above it; so does one within half a spacing.
+"""
 
 
 @dataclass(frozen=True)
 class Levels:
-    """Depths [m, downward] of a component's levels, rising; None where the file names none.
+    """Depths [m, downward] of a component's levels, rising; None if the file gives no depths.
 
-    `lower` (nz): how deep the value of each holds, the level itself where values are points, the lower face
-    where they are of layers. `top`: how shallow the first holds. `order`: the file's levels in this order.
-    `every`: `lower` of all the file's levels; `extent`: from where to where they hold. `words` say what was
-    taken for what, `bottom` what the deepest level with data says of the seabed.
+    `lower` (nz): the depth down to which each value holds; the level itself if values are points, the lower face
+    if they are layers. `top`: the depth where the first level begins to hold. `order`: indices of the levels in
+    the file. `every`: `lower` of all levels of the file. `extent`: a text on the depths for which they hold.
+    `description`: how the levels were read. `bottom`: what the deepest level with data tells of the seabed.
     """
 
     depth: Array | None
@@ -39,18 +40,18 @@ class Levels:
     dim: str | None
     name: str
     sigma: SigmaLevels | None
-    words: str
+    description: str
     bottom: str
     every: Array | None = None
     extent: str = ""
 
     @property
     def count(self) -> int:
-        """Levels of the file."""
+        """The number of levels in the file."""
         return 1 if self.depth is None else self.depth.size
 
     def cut(self, which: slice) -> "Levels":
-        """Some of the levels."""
+        """Return a part of the levels."""
         if self.depth is None or self.lower is None:
             return self
         return replace(self, depth=self.depth[which], lower=self.lower[which], every=self.lower)
@@ -60,56 +61,61 @@ NO_LEVELS = Levels(None, None, 0.0, np.zeros(1, np.int64), None, "", None, "", "
 
 
 def held_above(axis: Array) -> float:
-    """The shallowest depth [m] for which the first of some levels holds."""
+    """Return the shallowest depth [m] for which the first level holds."""
     spacing = float(axis[1] - axis[0]) if axis.size > 1 else 0.0
     reach = max(HELD_ABOVE, spacing / 2)
     return 0.0 if axis[0] <= reach else float(axis[0]) - spacing / 2
 
 
 def levels_of(at: Catalogue, variable: Any, axes: dict[str, tuple[str, str]]) -> Levels:
-    """The levels of a variable whose axes of "depth", "faces" or "sigma" are known by dimension and name."""
+    """Return the levels of a variable; `axes` gives dimension and coordinate of "depth", "faces" or "sigma"."""
     if "sigma" in axes:
         sigma = sigma_levels(at.name, at.data, variable, axes["sigma"][0])
         dim = axes["sigma"][0]
-        return replace(NO_LEVELS, dim=dim, name=dim, sigma=sigma, words=sigma.words)
+        return replace(NO_LEVELS, dim=dim, name=dim, sigma=sigma, description=sigma.description)
     if "faces" in axes:
         return _between_faces(at, *axes["faces"])
     scalar = at.scalar(variable, "depth")
     if "depth" not in axes and scalar is None:
         return NO_LEVELS
     name = axes["depth"][1] if "depth" in axes else str(scalar)
-    depth, order, factor, words = depths(at.name, at.data[name], at.said)
+    depth, order, factor, description = depths(at.name, at.data[name], at.names)
     lower, bottom = depth, f"the deepest level with data of each column (`{name}`, whose values are points)"
     bounds = _bounds(at, name, depth, factor, order)
     if bounds is not None:
         lower, bottom = bounds[0], f"the lower face of the deepest layer with data (`{bounds[1]}`)"
     along, top = axes["depth"][0] if "depth" in axes else None, held_above(depth)
     extent = f"{top:.4g} to {depth[-1]:.6g} m"
-    return Levels(depth, lower, top, order, along, name, None, words, bottom, extent=extent)
+    return Levels(depth, lower, top, order, along, name, None, description, bottom, extent=extent)
 
 
 def _between_faces(at: Catalogue, dim: str, name: str) -> Levels:
-    faces, order, _, words = depths(at.name, at.data[name], at.said)
+    faces, order, _, description = depths(at.name, at.data[name], at.names)
     middle = (faces[1:] + faces[:-1]) / 2
     turned = order[0] > order[-1]
     every = np.arange(middle.size)[:: -1 if turned else 1]
     bottom = f"the lower face of the deepest layer with data (`{name}`)"
-    told, extent = f"midway between {words}", f"{faces[0]:.4g} to {faces[-1]:.6g} m"
-    return Levels(middle, faces[1:], float(faces[0]), every, dim, name, None, told, bottom, extent=extent)
+    between, extent = f"midway between {description}", f"{faces[0]:.4g} to {faces[-1]:.6g} m"
+    return Levels(middle, faces[1:], float(faces[0]), every, dim, name, None, between, bottom, extent=extent)
 
 
 def faces_of(at: Catalogue, variable: Any, dim: str) -> str | None:
-    """The variable of the faces between the levels along a dimension, where their depths are not given."""
+    """Return the name of the variable with the faces between the levels, or None."""
     for name in map(str, at.data.variables):
-        one = at.data[name]
+        candidate = at.data[name]
         known = FACES.match(name) or at.kind(name) == "depth"
-        if one.ndim == 1 and one.size == variable.sizes[dim] + 1 and known and name not in variable.dims:
+        if (
+            candidate.ndim == 1
+            and candidate.size == variable.sizes[dim] + 1
+            and known
+            and name not in variable.dims
+        ):
             return name
     return None
 
 
 def _bounds(at: Catalogue, name: str, depth: Array, factor: float, order: Index) -> tuple[Array, str] | None:
-    """How deep each layer reaches, by the bounds or edges that a coordinate names."""
+    """Return the lower depth of each layer and the name of the bounds or edges it is from, or None."""
     for key in ("bounds", "edges"):
         of = str(at.data[name].attrs.get(key, ""))
         if of not in at.data.variables:
@@ -130,26 +136,27 @@ def _bounds(at: Catalogue, name: str, depth: Array, factor: float, order: Index)
     return None
 
 
-def check_hold(name: str, said: str | None, levels: Levels) -> bool:
-    """Whether the one level of a file is to be held at all depths, by the user's word."""
-    if said is None:
+def check_hold(name: str, hold: str | None, levels: Levels) -> bool:
+    """Return whether the user holds the file's level at all depths; InputError if it has several levels."""
+    if hold is None:
         return False
     require(
         levels.count == 1 and levels.sigma is None,
-        f"`hold` = {said!r} is for files of one level; {name} has {levels.count}: leave it out",
+        f"`hold` = {hold!r} is for files of one level; {name} has {levels.count}: leave it out",
     )
     return True
 
 
 def no_such_levels(name: str, axis: Array, depth: tuple[float, float], top: float) -> InputError | None:
-    """Why levels do not hold the depths of a domain [m], if they do not."""
+    """Return an error if the levels do not cover the depths of a domain [m], else None."""
     if depth[1] > axis[-1] + 0.01:
-        cure = '; name `hold` = "all" in `names` to hold its one level at all depths' if axis.size == 1 else ""
+        cure = '; set `hold` = "all" in `names` to hold its one level at all depths' if axis.size == 1 else ""
         return InputError(
             f"the domain reaches {depth[1]:g} m deep, but the deepest level of {name} is at {axis[-1]:g} m{cure}"
         )
     if depth[0] < top - 0.01:
         return InputError(
-            f"the domain begins at {depth[0]:g} m, but the data of {name} begin at {top:g} m: begin it there"
+            f"the domain begins at {depth[0]:g} m, but the data of {name} begin at {top:g} m: let the domain "
+            "begin there"
         )
     return None

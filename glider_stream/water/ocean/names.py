@@ -1,4 +1,4 @@
-"""Names: which variable of a file is what. The user's word first, then CF, then name, then long name."""
+"""Finds which variable of a file is what: by the user's names, then CF, then the name, then the long name."""
 
 import re
 from collections.abc import Iterable
@@ -39,7 +39,7 @@ SHORT_NAMES = [
 ]
 IN_METRES = {"uo", "vo", "uos", "vos", "utotal", "vtotal", "water_u", "water_v", "ugos", "vgos"}
 IN_METRES |= {"vozocrtx", "vomecrty", "u_eastward", "v_northward"}
-"""Names whose makers write m/s, with or without saying so."""
+"""Variables with these names are in m/s even if the file gives no unit."""
 LONG_NAMES = [
     (
         r"(?=.*\b(eastward|zonal)\b)(?=.*\b(current|velocity)\b)",
@@ -50,12 +50,12 @@ SENSE_OF_U = re.compile(r"\b(eastward|zonal|west.east|x.(velocity|component|dire
 SENSE_OF_V = re.compile(
     r"\b(northward|meridional|south.north|y.(velocity|component|direction)|v.(velocity|component))\b"
 )
-"""Long names that say which component a variable is."""
+"""Long names with these words tell which component a variable is."""
 NO_CURRENT = re.compile(r"\bwind|stress|stokes|flag|\berror|quality|uncertain|\bice\b|\bair\b|\bstd|variance")
 A_PART = re.compile(r"\btid(e|al)|geostrophic|anomal|barotropic|baroclinic|depth.?averag")
-"""A long name that says so is not the whole current."""
+"""A variable whose long name has one of these words is only a part of the current."""
 ALONG_GRID = re.compile(r"(^|_)[xy]_(sea_water_)?velocity|^vozocrtx$|^vomecrty$")
-"""Standard names, and names, of components along the rows and columns of a grid."""
+"""Standard names and names of components along the rows and columns of a grid."""
 ALONG_WORDS = re.compile(r"\b(grid.?[xyij]|[ij].?axis|[xy].?(direction|axis|component)|[uv].?momentum|xi|eta)\b")
 TOWARD_EAST = re.compile(
     r"(^|_)(eastward|northward)|\b(eastward|northward|zonal|meridional)\b|^[uv]_(east|north)"
@@ -85,15 +85,15 @@ AXIS_NAMES["lat"] |= {"gphit", "gphiu", "gphiv", "gphif", "geolat", "geolat_c", 
 AXIS_NAMES["lat"] |= {"geolat_v", "ulat", "tlat", "yc", "yg", "yu_ocean", "yt_ocean", "yh", "yq"}
 AT_U = re.compile(r"(_u|lamu|phiu|^ul(on|at|ong))$|^ul(on|at|ong)$|^xu_|^yu_|_c$|_q$", re.IGNORECASE)
 AT_V = re.compile(r"(_v|lamv|phiv)$|^ul(on|at|ong)$|^xu_|^yu_|_c$|_q$", re.IGNORECASE)
-"""Coordinates of points where u and v are, where a file holds those of others, too."""
+"""Coordinates of the points of u and v, in files that also hold other points."""
 ELSEWHERE = re.compile(r"(lam[ft]|phi[ft]|_psi|_t|_rho|^tl(on|at|ong))$", re.IGNORECASE)
-"""Coordinates of the points of tracers and of corners."""
+"""Coordinates of the points of tracers and of the cells' corners."""
 OTHERS = re.compile(r"^(tl(on|at|ong)|glam[ft]|gphi[ft]|geo(lon|lat)_t|(lon|lat)_psi)$", re.IGNORECASE)
-"""Coordinates at which no current is given, unless its own `coordinates` say so."""
+"""Coordinates without currents, unless the variable's `coordinates` attribute names them."""
 UNFIT_FOR_DEGREES = ("m", "km", "meters", "metres", "meter", "metre", "1")
-"""Units of a plane's own axes, which are no degrees."""
+"""Units of the axes of a plane, which are not degrees."""
 SINCE = re.compile(r"\bsince\s+[-+]?\d", re.IGNORECASE)
-"""Part of a unit of time that says when the count begins."""
+"""The part of a unit of time that gives its origin."""
 CF_AXES = {"longitude": "lon", "latitude": "lat", "vertical": "depth", "time": "time"}
 WORDS = {"lon": "longitude", "lat": "latitude", "depth": "depth", "time": "time"}
 SIGMA = re.compile(r"ocean_(s|sigma|double_sigma)")
@@ -101,19 +101,19 @@ SIGMA = re.compile(r"ocean_(s|sigma|double_sigma)")
 
 @dataclass(frozen=True)
 class Names:
-    """What a user says about a file; None is for the file to say.
+    """The user's settings for a file; None leaves a setting to the file.
 
-    `u`, `v`: the currents' variables; `lon`, `lat`, `depth`, `time`: their coordinates; `mask`: that of land;
-    `bottom`: the model's depth; `quality`: the flag of quality. Of these three, "none" leaves it out.
-    `units`: of the currents. `positive`: "down" or "up", the sense of the depths. `rotate`: "none" where u, v
-    are toward east and north, "grid" where along the grid's rows and columns, or the variable of the angle
-    from east to the rows. `stagger`: "none" where both lie at the coordinates given, "nemo" where u lies half
-    a cell along the rows from there and v half a cell across them. `land`: the mask's value there, 0 or 1.
-    `zeros`: what currents of exactly 0 are, "land" (or seabed) or "calm" water. `hold`: "all" holds the one
-    level of a file at all depths. `stamps`: where in the interval of a mean its time stands, "start",
-    "middle" or "end". `origin`: the date from which times count; with `step` [hours], the date of the first
-    of several files that do not say their time. `member` and `run`: which of an ensemble, and of several
-    forecasts, by its number or its date. `group`: of a NetCDF-4 file.
+    `u`, `v`: the variables of the currents. `lon`, `lat`, `depth`, `time`: their coordinates. `mask`: the land
+    mask; `bottom`: the model's depth; `quality`: the quality flag ("none" leaves one of these three out).
+    `units`: of the currents. `positive`: "down" or "up", the direction of the depths. `rotate`: "none" if u, v
+    are toward east and north, "grid" if they are along the grid's rows and columns, or the variable with the
+    angle from east to the rows. `stagger`: "none" if u and v lie at the given coordinates, "nemo" if u lies half
+    a cell further along the rows and v half a cell further across them. `land`: the mask's value on land, 0 or 1.
+    `zeros`: currents of exactly 0 are "land" (or seabed) or "calm" water. `hold`: "all" holds the one level of a
+    file at all depths. `stamps`: where in its interval the time of a mean stands, "start", "middle" or "end".
+    `origin`: the date from which times count, or with `step` [hours] the date of the first of several files that
+    hold no time. `member` and `run`: which member of an ensemble and which of several forecasts, by number or
+    date. `group`: of a NetCDF-4 file.
     """
 
     u: str | None = None
@@ -142,17 +142,17 @@ class Names:
     def __post_init__(self) -> None:
         for name, choices in CHOICES.items():
             value = getattr(self, name)
-            said = " or ".join(f'"{choice}"' for choice in choices)
-            require(value is None or value in choices, f"`{name}` must be {said}; got {value!r}")
+            allowed = " or ".join(f'"{choice}"' for choice in choices)
+            require(value is None or value in choices, f"`{name}` must be {allowed}; got {value!r}")
         require(self.land in (None, 0, 1), f"`land` must be 0 or 1; got {self.land!r}")
         require(self.step is None or self.step > 0, f"`step` must be above 0 hours; got {self.step}")
         require(
             self.step is None or self.origin is not None,
-            "`step` needs the date of the first file; name `origin`, too, such as 2024-11-20T00:00",
+            "`step` needs the date of the first file; also set `origin`, such as 2024-11-20T00:00",
         )
 
     def variables(self) -> dict[str, str]:
-        """Keys and values of those that name a variable of the file."""
+        """Return the settings that name a variable of the file, as keys and names."""
         keys = ("u", "v", "lon", "lat", "depth", "time", "mask", "bottom", "quality")
         given = {key: getattr(self, key) for key in keys}
         if self.rotate not in (None, "none", "grid"):
@@ -172,37 +172,37 @@ CHOICES = {
     "hold": ("all",),
     "stamps": ("start", "middle", "end"),
 }
-"""What some of the names may be."""
+"""The allowed values of some settings."""
 
 
 def standard_name(variable: Any) -> str:
-    """The CF standard name in lower case, or nothing; CROCO's, without the points that it adds."""
+    """Return the CF standard name in lower case, or an empty text; CROCO's additions about points are removed."""
     return re.sub(r"_at_[a-z]+_locations?$", "", str(variable.attrs.get("standard_name", "")).strip().lower())
 
 
 def units_of(variable: Any) -> str:
-    """The unit that a variable gives, under any spelling of the attribute, or nothing."""
+    """Return the unit of a variable, under any spelling of the attribute, or an empty text."""
     attrs = variable.attrs
     return next((str(attrs[key]).strip() for key in ("units", "unit", "Unit", "Units") if key in attrs), "")
 
 
 def listing(names: Iterable[Any]) -> str:
-    """Some names, for people."""
+    """Return a text of at most twelve names."""
     every = [str(name) for name in names]
     return (", ".join(every[:12]) + (", ..." if len(every) > 12 else "")) or "no variables"
 
 
 class Catalogue:
-    """What the variables of one open file (an xarray.Dataset) are."""
+    """The variables of one open file (an xarray.Dataset) and what they are."""
 
-    def __init__(self, name: str, data: Any, said: Names) -> None:
-        self.name, self.data, self.said = name, data, said
+    def __init__(self, name: str, data: Any, names: Names) -> None:
+        self.name, self.data, self.names = name, data, names
 
     def components(self) -> dict[str, tuple[str, str]]:
-        """Variable and reason of u, v, or of the one that is here; none if there is neither."""
-        told = {c: str(getattr(self.said, c)) for c in "uv" if getattr(self.said, c) is not None}
-        here = {c: (name, "as you say") for c, name in told.items() if name in self.data.variables}
-        if len(told) == 2 or (told and not here):
+        """Return variable and reason for u and v, or for the one that the file holds, or an empty dictionary."""
+        named = {c: str(getattr(self.names, c)) for c in "uv" if getattr(self.names, c) is not None}
+        here = {c: (name, "as you say") for c, name in named.items() if name in self.data.variables}
+        if len(named) == 2 or (named and not here):
             return here
         partial: dict[str, tuple[str, str]] = {}
         for how, pairs in (
@@ -221,25 +221,26 @@ class Catalogue:
         return partial
 
     def check_sense(self, component: str, name: str) -> tuple[str, ...]:
-        """InputError where a variable's standard name and its name speak of different components.
+        """Raise InputError if a variable's standard name and its name are of different components.
 
-        A note where only its long name speaks of the other: such texts are often copied from the neighbour.
+        Return a note if only its long name is of the other component: such texts are often copied by mistake.
         """
-        if getattr(self.said, component) == name:
+        if getattr(self.names, component) == name:
             return ()
         variable = self.data[name]
-        words = {"standard name": standard_name(variable), "name": name.lower()}
+        texts = {"standard name": standard_name(variable), "name": name.lower()}
         senses = {
-            what: "uv"[pair.index(word)]
-            for what, word in words.items()
+            what: "uv"[pair.index(text)]
+            for what, text in texts.items()
             for pair in (STANDARD_NAMES if what == "standard name" else SHORT_NAMES)
-            if word in pair
+            if text in pair
         }
         way = {"u": "toward east or along x", "v": "toward north or along y"}
-        told = ", ".join(f"its {what} {words[what]!r} is {way[sense]}" for what, sense in senses.items())
+        contradiction = ", ".join(f"its {what} {texts[what]!r} is {way[sense]}" for what, sense in senses.items())
         require(
             len(set(senses.values())) < 2,
-            f"`{name}` in {self.name} contradicts itself: {told}; name `u` and `v` in `names` if you know "
+            f"`{name}` in {self.name} contradicts itself: {contradiction}; set `u` and `v` in `names` if you "
+            "know "
             "which is which",
         )
         long = str(variable.attrs.get("long_name", "")).lower().replace("_", " ")
@@ -247,17 +248,17 @@ class Catalogue:
         if len(others) != 1 or others[0] == component:
             return ()
         believed = f"its {next(iter(senses), 'name')} is believed"
-        return (f"the long name of `{name}`, {long!r}, speaks of the other component: {believed}",)
+        return (f"the long name of `{name}`, {long!r}, is of the other component: {believed}",)
 
     def refuse(self) -> InputError:
-        """Why a file without currents is none."""
-        told = [f"`{n}`" for c in "uv" if (n := getattr(self.said, c)) is not None]
+        """Return the error for a file without currents."""
+        named = [f"`{n}`" for c in "uv" if (n := getattr(self.names, c)) is not None]
         held = listing(self.data.data_vars)
-        if told:
-            return InputError(f"{self.name} holds no variable {' or '.join(told)}; it holds: {held}")
+        if named:
+            return InputError(f"{self.name} holds no variable {' or '.join(named)}; it holds: {held}")
         return InputError(
-            f"{self.name} holds no current toward east and north that can be told by its name; "
-            f"name `u` and `v` in `names`, out of: {held}"
+            f"{self.name} holds no current toward east and north with a known name; "
+            f"set `u` and `v` in `names` to two of: {held}"
         )
 
     def _label(self, how: str, name: str) -> str:
@@ -267,7 +268,7 @@ class Catalogue:
         hits = []
         for name, variable in self.data.data_vars.items():
             standard = standard_name(variable)
-            words = f"{name} {variable.attrs.get('long_name', '')}".lower()
+            text = f"{name} {variable.attrs.get('long_name', '')}".lower()
             packed = "scale_factor" in variable.encoding
             speed = in_metres_per_second(units_of(variable)) is not None
             number = variable.dtype.kind == "f" or packed or (speed and variable.dtype.kind in "iu")
@@ -277,11 +278,11 @@ class Catalogue:
             if how == "standard_name":
                 matches = standard == key
             else:
-                matches = not standard and not NO_CURRENT.search(words)
+                matches = not standard and not NO_CURRENT.search(text)
                 if how == "name":
                     matches = matches and str(name).lower() == key
                 else:
-                    plain = words.replace("_", " ")
+                    plain = text.replace("_", " ")
                     matches = matches and not A_PART.search(plain) and re.search(key, plain) is not None
             if matches:
                 hits.append(str(name))
@@ -290,15 +291,15 @@ class Catalogue:
         require(
             len(hits) < 2,
             f"{self.name} holds {len(hits)} variables that could be the current, {', '.join(hits)}: "
-            "name `u` and `v` in `names`",
+            "set `u` and `v` in `names`",
         )
         return hits[0] if hits else None
 
     def kind(self, name: str) -> str | None:
-        """Which axis a coordinate is: lon, lat, depth, time, or a word for terrain-following levels."""
+        """Return a coordinate's axis: "lon", "lat", "depth", "time", "sigma" (terrain-following), or None."""
         variable = self.data[name]
         for kind in WORDS:
-            if getattr(self.said, kind) == name:
+            if getattr(self.names, kind) == name:
                 return kind
         standard, units = standard_name(variable), units_of(variable)
         if SIGMA.match(standard) or re.match(r"s_(rho|w)$", name):
@@ -316,56 +317,56 @@ class Catalogue:
             return None
         hit = next((kind for kind, known in AXIS_NAMES.items() if name.lower() in known), None)
         hit = self._plain_degrees(name, units) if hit is None else hit
-        # a plane's own metres are no degrees
+        # the metres of a plane are not degrees
         return None if hit in ("lon", "lat") and units.lower() in UNFIT_FOR_DEGREES else hit
 
     def _plain_degrees(self, name: str, units: str) -> str | None:
-        """x and y that are degrees: by their long name, or in a grid that GMT made."""
+        """Return the axis if x or y are degrees: by the long name, or because GMT made the grid."""
         variable = self.data[name]
         if variable.ndim != 1 or name.lower() not in ("x", "y"):
             return None
         kind = {"x": "lon", "y": "lat"}[name.lower()]
         long = str(variable.attrs.get("long_name", "")).lower()
-        told = WORDS[kind] in long and units.lower() in ("", "degrees", "degree", "deg")
+        described = WORDS[kind] in long and units.lower() in ("", "degrees", "degree", "deg")
         made = not units and {"node_offset", "GMT_version"} & set(self.data.attrs)
-        return kind if told or made else None
+        return kind if described or made else None
 
     def axis_of(self, variable: Any, dim: str) -> tuple[str, str] | None:
-        """Kind and name of the coordinate along a dimension, the dimension's own first."""
-        own = [dim] if dim in self.data.variables else []
-        others = [str(name) for name in (*variable.coords, *self.data.variables) if str(name) not in own]
+        """Return kind and name of the coordinate along a dimension; one with the dimension's name comes first."""
+        same_name = [dim] if dim in self.data.variables else []
+        others = [str(name) for name in (*variable.coords, *self.data.variables) if str(name) not in same_name]
         hits = [
             (kind, name)
-            for name in dict.fromkeys(own + others)
+            for name in dict.fromkeys(same_name + others)
             if self.data[name].dims == (dim,) and (kind := self.kind(name)) is not None
         ]
-        asked = [hit for hit in hits if getattr(self.said, hit[0], None) == hit[1]]
+        asked = [hit for hit in hits if getattr(self.names, hit[0], None) == hit[1]]
         return next(iter(asked or hits), None)
 
     def scalar(self, variable: Any, kind: str) -> str | None:
-        """A coordinate of one value; the height of a wind in the same file is none of the current's."""
-        own = self.coordinates(variable)
+        """Return the name of a coordinate of one value, or None; the height of a wind does not count."""
+        listed = self.coordinates(variable)
         hits = []
         for name in map(str, self.data.variables):
-            one = self.data[name]
-            if one.size != 1 or set(one.dims) - set(variable.dims) or self.kind(name) != kind:
+            candidate = self.data[name]
+            if candidate.size != 1 or set(candidate.dims) - set(variable.dims) or self.kind(name) != kind:
                 continue
-            wind = standard_name(one).startswith(("height", "altitude"))
-            known = standard_name(one) in AXIS_NAMES[kind] or name.lower() in AXIS_NAMES[kind]
-            if (name in own and not wind) or known:
+            wind = standard_name(candidate).startswith(("height", "altitude"))
+            known = standard_name(candidate) in AXIS_NAMES[kind] or name.lower() in AXIS_NAMES[kind]
+            if (name in listed and not wind) or known:
                 hits.append(name)
         return hits[0] if hits else None
 
     def coordinates(self, variable: Any) -> list[str]:
-        """The coordinates that a variable names itself."""
+        """Return the coordinates that a variable's attribute names."""
         return str(variable.encoding.get("coordinates", variable.attrs.get("coordinates", ""))).split()
 
     def places(self, variable: Any, component: str) -> tuple[str, str] | None:
-        """The two-dimensional longitude and latitude of a variable's points, if there are such."""
+        """Return the names of the two-dimensional longitude and latitude of a variable's points, or None."""
         dims = set(map(str, variable.dims))
         found = {}
         for kind in ("lon", "lat"):
-            said = getattr(self.said, kind)
+            wanted = getattr(self.names, kind)
             every = [
                 name
                 for name in map(str, self.data.variables)
@@ -373,22 +374,23 @@ class Catalogue:
                 and set(map(str, self.data[name].squeeze().dims)) <= dims
                 and self.kind(name) == kind
             ]
-            if said is not None and said in every:
-                every = [said]
+            if wanted is not None and wanted in every:
+                every = [wanted]
             every = [name for name in every if not ELSEWHERE.search(name)] or every
-            own = [name for name in every if name in self.coordinates(variable)]
+            listed = [name for name in every if name in self.coordinates(variable)]
             here = [name for name in every if (AT_U if component == "u" else AT_V).search(name)]
-            hits = own if len(own) == 1 else here if len(here) == 1 else every
-            elsewhere = [name for name in hits if said != name and name not in own and OTHERS.match(name)]
+            hits = listed if len(listed) == 1 else here if len(here) == 1 else every
+            elsewhere = [name for name in hits if wanted != name and name not in listed and OTHERS.match(name)]
             require(
                 not elsewhere,
-                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, places of cells' "
-                "centres or corners: add the file that holds its own, or name `lon` and `lat` in `names`",
+                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, which are cells' "
+                "centres or corners: add the file with the positions of its points, or set `lon` and `lat` in "
+                "`names`",
             )
             require(
                 len(hits) < 2,
                 f"`{variable.name}` in {self.name} may lie at any of {', '.join(hits)}: "
-                "name `lon` and `lat` in `names`",
+                "set `lon` and `lat` in `names`",
             )
             if hits:
                 found[kind] = hits[0]

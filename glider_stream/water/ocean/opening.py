@@ -1,4 +1,4 @@
-"""Opening ocean files, which are untrusted: NetCDF of either kind and Zarr, by xarray."""
+"""Opens ocean files, which are untrusted input: NetCDF of all versions and Zarr, by xarray."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from ...base.settings import require
 from ...base.untrusted import check_claim, check_file, check_links, groups_of
 
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-"""How TIFF files begin."""
+"""The first bytes of TIFF files."""
 OTHER_KINDS = {
     b"GRIB": "a GRIB file: install cfgrib, or convert it with `cdo -f nc4 copy` or `grib_to_netcdf`",
     **dict.fromkeys(TIFF, "a GeoTIFF: install rioxarray, or convert it with `gdal_translate -of netCDF`"),
@@ -29,22 +29,23 @@ OTHER_KINDS = {
     b"NCOLS": "an ESRI ASCII grid: convert it with `gdal_translate -of netCDF`",
     b"DSAA": "a Surfer grid: convert it with `gdal_translate -of netCDF`",
 }
-"""Files that are not read, by how they begin, and the tool that converts them."""
+"""The first bytes of files that cannot be read, and the tool that converts them."""
 MOST_STORE_FILES = 100_000
-"""Files of a Zarr store that are looked at."""
+"""A Zarr store may hold at most this many files."""
 
 
 DECODERS = re.compile(
     r"^(xarray\.(backends|coding|conventions)|h5netcdf|h5py|scipy\.io|zarr|numcodecs|cftime|netCDF4|cfgrib|eccodes|rasterio|rioxarray)\b"
 )
-"""Packages that read what a file holds: an error that comes out of them speaks of the file."""
+"""Packages that read files: an error that is raised in one of them is about the file."""
 
 
 @contextmanager
 def opened(path: Path, group: str | None = None) -> Iterator[Any]:
-    """The xarray.Dataset of a file, times undecoded; InputError where it is none, or damaged.
+    """Yield the xarray.Dataset of a file, with times undecoded.
 
-    `group` of a NetCDF-4 file, where it has several; the only one that holds grids is taken without a word.
+    InputError if it is not a grid file or is damaged. `group`: the group of a NetCDF-4 file. If only one group
+    holds grids, it is taken.
     """
     _needs("xarray", path)
     _needs("cf_xarray", path)
@@ -59,13 +60,13 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
             check_links(path)
             more = {"group": _group(path, group)}
         with warnings.catch_warnings():
-            # of the packages that read, and of stale attributes of good data: several fill values, odd calendars
+            # warnings of the reading packages, and of old attributes: several fill values, odd calendars
             warnings.simplefilter("ignore")
             data = xarray.open_dataset(path, engine=engine, decode_times=False, cache=False, **more)
     except InputError:
         raise
     except Exception as error:
-        # what a damaged file makes the libraries raise is not written down anywhere
+        # the libraries do not document what they raise for a damaged file
         raise _damaged(path, error) from None
     with warnings.catch_warnings(), data:
         warnings.simplefilter("ignore", xarray.SerializationWarning)
@@ -88,7 +89,7 @@ def _damaged(path: Path, error: Exception) -> InputError:
 
 
 def _of_the_file(error: Exception) -> bool:
-    """Whether an error came out of a decoder, rather than out of this package."""
+    """Return whether an error was raised by a reading package and not by this one."""
     if not isinstance(error.__traceback__, TracebackType):
         return False
     modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
@@ -96,26 +97,25 @@ def _of_the_file(error: Exception) -> bool:
     return any(DECODERS.match(name) for name in modules[last + 1 :])
 
 
-def _group(path: Path, said: str | None) -> str | None:
-    """The group of a NetCDF-4 file that holds grids: the user's, the root, or the only one that does."""
+def _group(path: Path, named: str | None) -> str | None:
+    """Return the group that holds grids: the user's, the root, or the only one that does."""
     every, grids = groups_of(path)
-    if said is not None:
-        wanted = said.strip("/")
+    if named is not None:
+        wanted = named.strip("/")
         known = ", ".join(every) or "none"
-        require(wanted in (*every, ""), f"{path.name} holds no group `{said}`; it holds: {known}")
+        require(wanted in (*every, ""), f"{path.name} holds no group `{named}`; it holds: {known}")
         return wanted or None
     if not grids or "" in grids:
         return None
     require(
         len(grids) == 1,
-        f"{path.name} holds grids in {len(grids)} groups, {', '.join(sorted(grids)[:6])}: name `group` in "
-        "`names`",
+        f"{path.name} holds grids in {len(grids)} groups, {', '.join(sorted(grids)[:6])}: set `group` in `names`",
     )
     return grids.pop()
 
 
 def _with_parents(path: Path, data: Any, group: str | None) -> Any:
-    """The data of a group, and the axes that it takes from the groups around it."""
+    """Return the data of a group, with the axes of the groups around it."""
     import xarray
 
     while group:
@@ -141,13 +141,13 @@ def _needs(module: str, path: Path) -> None:
 
 
 def _engine(path: Path) -> tuple[str, dict[str, Any]]:
-    """What opens a file, and what it is told; InputError names the tool that converts what is not read."""
+    """Return the engine that opens a file and its options; InputError names a tool that converts the file."""
     if path.is_dir():
         store = any((path / name).is_file() for name in ("zarr.json", ".zgroup", ".zmetadata"))
-        require(store, f"{path} is a folder and no Zarr store; name the NetCDF file in it")
+        require(store, f"{path} is a folder but not a Zarr store; name the NetCDF file in it")
         _needs("zarr", path)
         _check_store(path)
-        # told, it neither guesses nor warns
+        # with this option it neither guesses nor warns
         return "zarr", {"consolidated": _is_consolidated(path)}
     try:
         with path.open("rb") as stream:
@@ -166,11 +166,11 @@ def _engine(path: Path) -> tuple[str, dict[str, Any]]:
         return "rasterio", {}
     for mark, what in OTHER_KINDS.items():
         require(not head.startswith(mark), f"{path.name} is {what}")
-    raise InputError(f"{path.name} is not a NetCDF file, whatever its name")
+    raise InputError(f"{path.name} is not a NetCDF file, although its name may say so; give a NetCDF file")
 
 
 def _is_consolidated(path: Path) -> bool:
-    """Whether a Zarr store keeps what it holds in one place."""
+    """Return whether a Zarr store keeps its metadata in one file."""
     if (path / ".zmetadata").is_file():
         return True
     whole = path / "zarr.json"
@@ -178,7 +178,7 @@ def _is_consolidated(path: Path) -> bool:
 
 
 def _check_store(path: Path) -> None:
-    """A Zarr store names its codecs; one that unpickles runs whatever it holds."""
+    """Raise InputError if a Zarr store uses a codec that unpickles, because that can run any code."""
     for count, file in enumerate(path.rglob("*")):
         require(count < MOST_STORE_FILES, f"{path} holds more than {MOST_STORE_FILES:,} files; cut the store")
         check_file(file, f"in {path}, ")
@@ -193,7 +193,7 @@ def _check_store(path: Path) -> None:
 
 
 def _check_claims(path: Path, data: Any) -> None:
-    """Refuse what no file of its size can hold, before room is made for it."""
+    """Raise InputError if a file declares more data than a file of its size can hold, before memory is used."""
     held = sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) if path.is_dir() else path.stat().st_size
     for name, variable in data.variables.items():
         if path.is_dir() and (path / str(name)).is_dir():

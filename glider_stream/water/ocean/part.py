@@ -1,4 +1,4 @@
-"""What one file says of one component, on points of its own."""
+"""One component of the current from one file, on its own points."""
 
 from dataclasses import dataclass
 
@@ -17,12 +17,12 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Part:
-    """One component out of one file, on points of its own: `values` (nt, nz, ny, nx) [m/s].
+    """One component of the current from one file, on its own points: `values` (nt, nz, ny, nx) [m/s].
 
-    `levels`: those that were read. `deeper` (1, n, ny, nx): what the levels below them hold, at the first time
-    or, where that is zero, at the time of the fastest. `way`: "east", "grid" or "unsure", along what it runs.
-    `signs`: of the plane's axes that the file counts downward. `fields`: what the file says at places of their
-    own: `angle`, `seabed`. `zeros`: what the file's zeros look like.
+    `levels`: the levels that were read. `deeper` (1, n, ny, nx): values of the levels below them, at the first
+    time, or at the time of the fastest current where that is zero. `way`: the direction of the component, "east",
+    "grid" or "unsure". `signs`: -1 for an axis of the plane that the file counts downward. `fields`: fields at
+    other points, `angle` and `seabed`. `zeros`: how the file uses zeros.
     """
 
     component: str
@@ -42,7 +42,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Field:
-    """Numbers (n,) at places (n,) [degrees], under a variable's name."""
+    """Numbers (n,) at places (n,) [degrees], with the name of their variable."""
 
     name: str
     lon: Array
@@ -50,7 +50,7 @@ class Field:
     values: Array
 
     def at(self, lon: Array, lat: Array) -> Array | None:
-        """The values at other points (ny, nx), where these are the field's own; else None."""
+        """Return the values at the points (ny, nx) if these are the field's own points, else None."""
         points = unit_vectors(lon, lat)
         tree = KDTree(unit_vectors(self.lon, self.lat))
         off, nearest = map(np.asarray, tree.query(points.reshape(-1, 3)))
@@ -58,7 +58,7 @@ class Field:
         return self.values[nearest].reshape(lon.shape) if float(off.max()) < 0.2 * cell else None
 
     def least(self, lon: Array, lat: Array) -> Array:
-        """The value at each of other points (ny, nx), or the least of those around it; NaN where none is near."""
+        """Return the value at each point (ny, nx), or the least of the values around it; NaN if none is near."""
         points = unit_vectors(lon, lat)
         cell = np.linalg.norm(np.diff(points, axis=1), axis=-1).max(initial=0.0)
         if self.lon.size == 0:
@@ -67,8 +67,8 @@ class Field:
         off, near = map(np.asarray, tree.query(points.reshape(-1, 3), k=min(4, self.lon.size)))
         off, near = off.reshape(lon.size, -1), near.reshape(lon.size, -1)
         around = np.where(off <= 1.2 * cell, self.values[near], np.inf)
-        # land among the points around is no depth: only where the point itself has none, there is none
+        # land among the points around does not count: a point has no depth only if it is itself on land
         around = np.where(np.isnan(around), np.inf, around).min(axis=1)
-        own = self.values[near[:, 0]]
-        value = np.where(off[:, 0] < 0.2 * cell, own, np.where(np.isinf(around), np.nan, around))
+        nearest = self.values[near[:, 0]]
+        value = np.where(off[:, 0] < 0.2 * cell, nearest, np.where(np.isinf(around), np.nan, around))
         return np.asarray(value.reshape(lon.shape))

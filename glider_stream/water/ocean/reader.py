@@ -1,4 +1,4 @@
-"""Ocean current files: right values, or one sentence that says what is missing and how to say it."""
+"""Reads ocean current files. It returns right values, or one sentence with what is missing and the cure."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -19,7 +19,7 @@ from .opening import opened
 from .part import Part
 
 LIMIT = 2e9
-"""The most that the currents of a domain may take in memory [bytes]: two float64 a point."""
+"""The currents of a domain may take at most this much memory [bytes]; a point takes two float64."""
 NO_GRIDS = {"trajectory", "timeseries", "profile", "trajectoryprofile", "timeseriesprofile", "point"}
 
 
@@ -32,44 +32,44 @@ def read_currents(
     depth: Range | None = None,
     limit: float = LIMIT,
 ) -> OceanFile:
-    """The currents of one file, or of several: one per component or stretch of time, and those of the grid.
+    """Return the currents of one file or several: components, stretches of time, or the model's grid.
 
-    `names` as `Names` says. `lon`, `lat` [degrees] and `depth` [m] read no more than a domain
-    needs; more than `limit` [bytes] is refused.
+    `names`: see `Names`. `lon`, `lat` [degrees] and `depth` [m]: only what a domain needs is read. InputError if
+    the currents take more memory than `limit` [bytes].
     """
     paths = [Path(files)] if isinstance(files, (str, Path)) else [Path(path) for path in files]
     require(len(paths) > 0, "`flow.file` must name at least one current file; got none")
-    said = names if isinstance(names, Names) else from_table(Names, names or {}, "names")
+    given = names if isinstance(names, Names) else from_table(Names, names or {}, "names")
     domain = None if lon is None or lat is None else (lon, lat, depth or (0.0, 0.0))
     parts: list[Part] = []
     with ExitStack() as stack:
         beside: list[Any] = []
         held: dict[str, Sequence[str]] = {}
         with_currents = []
-        for path in paths if len(paths) > 1 or said.variables() else []:
-            with opened(path, said.group) as data:
+        for path in paths if len(paths) > 1 or given.variables() else []:
+            with opened(path, given.group) as data:
                 held[path.name] = list(map(str, data.variables))
-                if Catalogue(path.name, data, said).components():
+                if Catalogue(path.name, data, given).components():
                     with_currents.append(path)
         if held:
-            _check_names(held, said)
+            _check_names(held, given)
         if len(paths) > 1:
             grids = [path for path in paths if path not in with_currents]
-            beside = [stack.enter_context(opened(path, said.group)) for path in grids]
+            beside = [stack.enter_context(opened(path, given.group)) for path in grids]
             paths = with_currents or paths[:1]
         for path in paths:
-            with opened(path, said.group) as data:
+            with opened(path, given.group) as data:
                 room = limit - sum(8.0 * part.values.size for part in parts)
                 whole = _with(data, beside)
-                found = _parts(Catalogue(path.name, whole, said), domain, room, depth is None)
-                parts += [_dated(_grounded(part, beside, said), parts, said) for part in found]
-    return joined(paths, parts, said)
+                found = _parts(Catalogue(path.name, whole, given), domain, room, depth is None)
+                parts += [_dated(_grounded(part, beside, given), parts, given) for part in found]
+    return joined(paths, parts, given)
 
 
-def _check_names(held: dict[str, Sequence[str]], said: Names) -> None:
-    """InputError where the user names a variable that none of the files holds."""
-    every = [name for names in held.values() for name in names]
-    for key, name in said.variables().items():
+def _check_names(held: dict[str, Sequence[str]], names: Names) -> None:
+    """Raise InputError if the user names a variable that no file holds."""
+    every = [name for variables in held.values() for name in variables]
+    for key, name in names.variables().items():
         require(
             name in every,
             f"{' and '.join(list(held)[:3])} {'holds' if len(held) == 1 else 'hold'} no variable `{name}`, which "
@@ -78,11 +78,12 @@ def _check_names(held: dict[str, Sequence[str]], said: Names) -> None:
 
 
 def _parts(at: Catalogue, domain: Domain | None, room: float, whole_depth: bool) -> list[Part]:
-    """Both components, or the one that this file holds."""
+    """Return both components, or the one that this file holds."""
     sort = str(at.data.attrs.get("featureType", "")).lower()
     require(
         sort not in NO_GRIDS,
-        f"{at.name} is a {sort}: what was measured along a track or at a mooring is no grid to plan on",
+        f"{at.name} is a {sort}: a plan needs a grid, and measurements along a track or at a mooring are not a "
+        "grid",
     )
     found = at.components()
     if not found:
@@ -94,35 +95,35 @@ def _parts(at: Catalogue, domain: Domain | None, room: float, whole_depth: bool)
     return result
 
 
-def _grounded(part: Part, beside: list[Any], said: Names) -> Part:
-    """A part, with the model's depth out of a file beside it where its own file has none."""
+def _grounded(part: Part, beside: list[Any], names: Names) -> Part:
+    """Return the part; the model's depth is taken from a file beside it if its own file has none."""
     if "seabed" in part.fields:
         return part
     for other in beside:
-        found = model_depth(Catalogue("the file beside it", other, said), part.grid, None)
+        found = model_depth(Catalogue("the file beside it", other, names), part.grid, None)
         if found is not None and found.lon.size:
             return replace(part, fields={**part.fields, "seabed": found})
     return part
 
 
-def _dated(part: Part, before: list[Part], said: Names) -> Part:
-    """A part of one step without time, at the time that the user gives the files in their order."""
-    if said.step is None:
+def _dated(part: Part, before: list[Part], names: Names) -> Part:
+    """Return the part with the time that the user gives: `origin`, plus `step` for each earlier file."""
+    if names.step is None:
         return part
-    number = sum(one.component == part.component for one in before)
+    number = sum(earlier.component == part.component for earlier in before)
     require(
         part.times is None and len(part.values) == 1,
-        "`step` is for files of one step each that do not say their time; at least one of these says it: leave "
+        "`step` is for files of one step each that hold no time; at least one of these holds its time: leave "
         "it out",
     )
-    first = parse_time(str(said.origin), "`origin`")
-    after = np.timedelta64(round(number * said.step * 3_600_000), "ms")
-    took = {**part.took, "time": f"{said.origin} and {said.step:g} h from file to file, as you say"}
+    first = parse_time(str(names.origin), "`origin`")
+    after = np.timedelta64(round(number * names.step * 3_600_000), "ms")
+    took = {**part.took, "time": f"{names.origin} and {names.step:g} h from file to file, as you say"}
     return replace(part, times=np.array([first + after]), took=took)
 
 
 def _with(data: Any, beside: list[Any]) -> Any:
-    """A dataset, and those variables of others that fit its dimensions: a model's grid in a file of its own."""
+    """Return a dataset with the variables of other files that fit its dimensions, such as a model's grid."""
     for other in beside:
         fits = {
             name: variable
@@ -134,14 +135,16 @@ def _with(data: Any, beside: list[Any]) -> Any:
 
 
 def _fits(data: Any, other: Any, dim: str, size: int) -> bool:
-    """Whether a dimension of another dataset is that of this one: as long, with the same coordinates."""
+    """Return whether a dimension of another dataset is the same: equally long, with the same coordinates."""
     if data.sizes.get(dim, size) != size:
         return False
     if dim not in data.variables or dim not in other.variables:
         return True
-    one, two = data[dim].values, other[dim].values
-    if one.dtype.kind not in "fiu" or two.dtype.kind not in "fiu":
+    values, others = data[dim].values, other[dim].values
+    if values.dtype.kind not in "fiu" or others.dtype.kind not in "fiu":
         return True
     return bool(
-        np.allclose(one, two, rtol=0, atol=1e-3 * max(float(np.abs(np.diff(one)).min(initial=1.0)), 1e-9))
+        np.allclose(
+            values, others, rtol=0, atol=1e-3 * max(float(np.abs(np.diff(values)).min(initial=1.0)), 1e-9)
+        )
     )

@@ -1,25 +1,25 @@
-"""No data that a chart does not declare: a number that stands for it, told by how it lies among the others."""
+"""Finds undeclared numbers for "no data" in a chart by comparing each number with its neighbours."""
 
 import numpy as np
 
 from ...base.arrays import Array, Bools
 
 DEEPEST = 11_100.0
-"""No sea is as deep [m], nor any land as high: whatever lies beyond is no data."""
+"""No sea is as deep as this [m] and no land as high; numbers beyond it are no data."""
 CODES = frozenset({999.0, 9999.0, 10_000.0, 99_999.0, 32_767.0, 32_768.0, 8888.0, 7777.0})
-"""Numbers, of either sign, that stand for no data in files; or for depths, where they lie among such."""
+"""Numbers, of either sign, that files use for no data. They may also be depths among similar depths."""
 CLIFF = 5000.0
-"""No seabed falls as far everywhere from one cell to the next [m]."""
+"""No seabed falls this far [m] from one cell to the next at all its borders."""
 BESIDE = 3.0
-"""A code lies so many times further from its neighbours than others do from theirs ..."""
+"""A code differs from its neighbours by this many times the usual difference ..."""
 LEAST = 50.0
 """... and at least this far [m]."""
 FLAT = 0.2
-"""A chart with a smaller share of equal neighbours is not flat: a block of one number in it was put there."""
+"""A chart with a smaller share of equal neighbours is not flat: a block of one number in it is artificial."""
 
 
 def _pairs(values: Array) -> tuple[Array, Array]:
-    """Neighbours along rows and across them, (n,) each."""
+    """Return the pairs of neighbours along and across the rows, (n,) each."""
     first = np.concatenate([values[:, :-1].ravel(), values[:-1].ravel()])
     second = np.concatenate([values[:, 1:].ravel(), values[1:].ravel()])
     both = np.isfinite(first) & np.isfinite(second)
@@ -27,12 +27,12 @@ def _pairs(values: Array) -> tuple[Array, Array]:
 
 
 def _stands_apart(value: float, first: Array, second: Array, values: Array) -> bool:
-    """Whether a number lies among others as no depth does."""
-    one, other = first == value, second == value
-    edge, away = one ^ other, ~(one | other)
+    """Return whether a number differs from its neighbours as no depth does."""
+    in_first, in_second = first == value, second == value
+    edge, away = in_first ^ in_second, ~(in_first | in_second)
     jumps, usual = np.abs(first - second)[edge], np.abs(first - second)[away]
     if not edge.any():
-        # nothing but this number: only where no sea is as deep
+        # the chart holds only this number: it is a code only if no sea is as deep
         return abs(value) >= 9999.0
     typical = float(np.quantile(usual, 0.9)) if usual.size else 0.0
     least = float(np.quantile(jumps, 0.1))
@@ -47,10 +47,10 @@ def _stands_apart(value: float, first: Array, second: Array, values: Array) -> b
 
 
 def undeclared(values: Array) -> tuple[Bools, list[float]]:
-    """Where a chart (ny, nx) [its unit, metres] holds no data without saying so, and the numbers that say it.
+    """Return where a chart (ny, nx) [m] holds undeclared no data, and the numbers that mark it.
 
-    Numbers deeper than any sea or higher than any land; and one number, repeated, that stands apart: a code
-    such as -9999 that is far from what lies beside it, or any that falls further than a seabed can.
+    These are numbers deeper than any sea or higher than any land, and one repeated number that stands apart: a
+    code such as -9999 that is far from its neighbours, or a number that falls further than a seabed can.
     """
     known = np.isfinite(values)
     beyond = known & (np.abs(values) > DEEPEST)
@@ -61,7 +61,7 @@ def undeclared(values: Array) -> tuple[Bools, list[float]]:
     candidates += [float(value) for value in held[[0, -1]] if held.size and float(value) not in candidates]
     for value in candidates:
         here = rest == value
-        # most of a chart is sea; a code may be all that a domain holds
+        # most of a chart is sea, but a domain may hold nothing but a code
         few = abs(value) in CODES or 2 * int(here.sum()) < int(np.isfinite(rest).sum())
         if few and _stands_apart(value, *_pairs(rest), rest):
             rest = np.where(here, np.nan, rest)

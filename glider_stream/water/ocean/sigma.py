@@ -1,4 +1,4 @@
-"""Terrain-following levels: the depth of each, and values on levels of fixed depth."""
+"""Terrain-following levels: the depth of each level, and values on levels of fixed depth."""
 
 import re
 from dataclasses import dataclass
@@ -14,20 +14,21 @@ from .names import SIGMA, listing, standard_name
 
 Values = NDArray[np.float32]
 FINER = 2
-"""Levels of fixed depth for each terrain-following one: interpolating twice must not blur."""
+"""There are this many levels of fixed depth for each terrain-following one, so that interpolation does not blur.
+"""
 SAME = 1e-6
 THIN = 0.1
-"""A single level this near the surface or the seabed, as a share of the depth, is the outermost layer."""
+"""A single level this near to the surface or the seabed, as a share of the depth, is the outermost layer."""
 
 
 @dataclass(frozen=True)
 class SigmaLevels:
     """Heights z(s) [m, upward] of levels over a seabed at depth h under a surface at zeta.
 
-    The three forms of CF Appendix D. `stretch` C and `at` s (levels): ocean_s_coordinate_g1:
-    S = hc s + (h - hc) C, z = S + zeta (1 + S / h). _g2: S = (hc s + h C) / (hc + h), z = zeta + (zeta + h) S.
-    ocean_sigma_coordinate: z = zeta + s (zeta + h).
-    `low`, `high`: s and C where the layers that the file holds begin and end, -1 and 0 of a whole column.
+    The three forms of CF Appendix D; `stretch` is C and `at` is s, (levels,). ocean_s_coordinate_g1: S = hc s +
+    (h - hc) C, z = S + zeta (1 + S / h). ocean_s_coordinate_g2: S = (hc s + h C) / (hc + h), z = zeta + (zeta +
+    h) S. ocean_sigma_coordinate: z = zeta + s (zeta + h). `low`, `high`: s and C where the layers in the file
+    begin and end; they are -1 and 0 for a whole column.
     """
 
     form: str
@@ -37,27 +38,30 @@ class SigmaLevels:
     critical: float
     depth: Any
     surface: Any | None
-    words: str
+    description: str
     low: tuple[float, float]
     high: tuple[float, float]
 
     @property
     def whole(self) -> bool:
-        """Whether the levels are those of the whole column."""
+        """Whether the levels cover the whole column."""
         return self.low[0] == -1.0 and self.high[0] == 0.0
 
     def heights(self, h: Array, zeta: Array | float) -> Array:
-        """Heights of all levels over points of depth `h` (ny, nx): (levels, ny, nx)."""
+        """Return the heights (levels, ny, nx) [m] of all levels over points of depth `h` (ny, nx)."""
         return self._heights(self.at, self.stretch, h, zeta)
 
     def ends(self, h: Array, zeta: Array | float) -> Array:
-        """Heights (2, ny, nx) [m] between which there are data: the outermost levels, half a layer further."""
+        """Return the heights (2, ny, nx) [m] between which there are data.
+
+        They are half a layer beyond the outermost levels.
+        """
         s, c = (np.array([low, high]) for low, high in zip(self.low, self.high, strict=True))
         found = self._heights(s, c, h, zeta)
         if self.low[0] == -1.0:
             found[0] = -np.inf
         if self.high[0] == 0.0:
-            # under an ebb, too, the first level is that of the surface
+            # at low water, too, the first level is at the surface
             found[1] = np.inf
         return found
 
@@ -73,7 +77,7 @@ class SigmaLevels:
 
 
 def _coordinate(data: Any, dim: str, variable: Any) -> Any | None:
-    """The values of s along the levels: by their standard name, under the dimension's name, or CROCO's."""
+    """Return s along the levels: by standard name, under the dimension's name, or in CROCO's form."""
     for name in map(str, data.variables):
         if data[name].dims == (dim,) and SIGMA.match(standard_name(data[name])):
             return data[name]
@@ -81,11 +85,11 @@ def _coordinate(data: Any, dim: str, variable: Any) -> Any | None:
 
 
 def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
-    """What a file says of the terrain-following levels of a variable; InputError names what is missing."""
+    """Return the terrain-following levels of a variable; InputError names what is missing."""
     coordinate = _coordinate(data, dim, variable)
     broken = f"`{variable.name}` in {name} is on terrain-following levels `{dim}`"
     if coordinate is None:
-        raise InputError(f"{broken} without values of its own; add the file that holds them")
+        raise InputError(f"{broken}, which have no values in this file; add the file that holds them")
     terms = dict(re.findall(r"(\w+)\s*:\s*(\S+)", str(coordinate.attrs.get("formula_terms", ""))))
 
     def term(key: str, *usual: str) -> Any | None:
@@ -93,31 +97,34 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
         return next((data[n] for n in (*names, *usual) if n in data.variables), None)
 
     def number(key: str, *usual: str) -> float | None:
-        one = term(key, *usual)
-        if one is not None and one.size == 1:
-            return float(one.values.ravel()[0])
-        said = next((data.attrs[n] for n in usual if n in data.attrs), None)
-        if isinstance(said, str):
-            # CROCO says so in a word
-            return {"NEW": 2.0, "OLD": 1.0}.get(said.strip().upper())
-        return None if said is None else float(np.ravel(said)[0])
+        variable_found = term(key, *usual)
+        if variable_found is not None and variable_found.size == 1:
+            return float(variable_found.values.ravel()[0])
+        attribute = next((data.attrs[n] for n in usual if n in data.attrs), None)
+        if isinstance(attribute, str):
+            # CROCO writes a word
+            return {"NEW": 2.0, "OLD": 1.0}.get(attribute.strip().upper())
+        return None if attribute is None else float(np.ravel(attribute)[0])
 
     standard = standard_name(coordinate)
     h, zeta = term("depth", "h", "bathy", "depth"), term("eta", "zeta", "ssh", "zos")
     if h is None or h.ndim < 2:
         raise InputError(f"{broken}, but the file holds no depth of the seabed `h`; add the grid file that does")
     s = np.asarray(coordinate.values, np.float64)
-    require(bool(((s >= -1 - SAME) & (s <= SAME)).all()), f"{broken}, whose values do not lie in -1 to 0")
-    words = f"{dim}: terrain-following levels over `{h.name}`"
-    words += " under a level surface" if zeta is None else f" under `{zeta.name}`"
+    require(
+        bool(((s >= -1 - SAME) & (s <= SAME)).all()),
+        f"{broken}, whose values are not all from -1 to 0; mend the file",
+    )
+    description = f"{dim}: terrain-following levels over `{h.name}`"
+    description += " under a level surface" if zeta is None else f" under `{zeta.name}`"
     if standard == "ocean_sigma_coordinate":
         low, high = _ends(name, variable, s, s)
-        return SigmaLevels("sigma", dim, s, s, 0.0, h, zeta, _told(words, low, high), low, high)
+        return SigmaLevels("sigma", dim, s, s, 0.0, h, zeta, _with_range(description, low, high), low, high)
     transform = number("", "Vtransform", "vtransform", "VertCoordType")
     if standard not in ("ocean_s_coordinate_g1", "ocean_s_coordinate_g2"):
         if standard and standard != "ocean_s_coordinate":
             raise InputError(
-                f"{broken} of the form {standard!r}, which is not known: interpolate to fixed depths"
+                f"{broken} of the form {standard!r}, which is not known: interpolate them to fixed depths first"
             )
         if transform not in (1.0, 2.0):
             raise InputError(f"{broken}, but the file has no `Vtransform` of 1 or 2; add the grid file that does")
@@ -128,23 +135,25 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     )
     stretch, critical = term("C", "Cs_r", "Cs_rho"), number("depth_c", "hc", "Tcline")
     stretch = _among_attributes(data, dim, variable, "Cs_r") if stretch is None else stretch
-    lacks = [what for what, one in (("Cs_r", stretch), ("hc", critical)) if one is None]
+    lacks = [what for what, term_found in (("Cs_r", stretch), ("hc", critical)) if term_found is None]
     require(not lacks, f"{broken}, but the file holds no {listing(lacks)}; add the grid file that does")
     assert stretch is not None
     assert critical is not None
     c = np.asarray(stretch.values, np.float64)
     require(c.shape == s.shape, f"{broken}, but `{stretch.name}` has {c.size} values for {s.size} levels")
     low, high = _ends(name, variable, s, c)
-    return SigmaLevels(standard[-2:], dim, s, c, critical, h, zeta, _told(words, low, high), low, high)
+    return SigmaLevels(
+        standard[-2:], dim, s, c, critical, h, zeta, _with_range(description, low, high), low, high
+    )
 
 
-def _told(words: str, low: tuple[float, float], high: tuple[float, float]) -> str:
+def _with_range(description: str, low: tuple[float, float], high: tuple[float, float]) -> str:
     kept = "" if (low[0], high[0]) == (-1.0, 0.0) else f", those from s = {low[0]:.3g} to {high[0]:.3g} only"
-    return words + kept
+    return description + kept
 
 
 def _among_attributes(data: Any, dim: str, variable: Any, name: str) -> Any | None:
-    """Values along the levels that CROCO writes as an attribute of the file."""
+    """Return values along the levels that CROCO writes as an attribute of the file, or None."""
     import xarray
 
     values = np.ravel(data.attrs.get(name, []))
@@ -154,16 +163,20 @@ def _among_attributes(data: Any, dim: str, variable: Any, name: str) -> Any | No
 
 
 def _ends(name: str, variable: Any, s: Array, c: Array) -> tuple[tuple[float, float], tuple[float, float]]:
-    """s and C where the outermost layers end: half a layer beyond their levels, -1 and 0 of a whole column."""
+    """Return s and C where the outermost layers end.
+
+    They end half a layer beyond their levels; a whole column ends at -1 and 0.
+    """
     order = np.argsort(s)
     at, stretch = s[order], c[order]
     if at.size == 1:
-        # nothing says how thick it is: the uppermost or the lowest layer of many, or none that can be told
+        # its thickness is unknown unless it is the uppermost or the lowest layer of many
         half = min(-at[0], 1 + at[0])
         require(
             half <= THIN,
-            f"`{variable.name}` in {name} has one terrain-following level, at s = {at[0]:.3g}, amid the water: "
-            "nothing says for which depths it holds; cut the file with more levels",
+            f"`{variable.name}` in {name} has one terrain-following level, at s = {at[0]:.3g}, far from surface "
+            "and seabed: "
+            "the depths for which it holds are unknown; give a file with more levels",
         )
         return (
             ((-1.0, -1.0), (2 * half - 1, 2 * half - 1))
@@ -177,18 +190,21 @@ def _ends(name: str, variable: Any, s: Array, c: Array) -> tuple[tuple[float, fl
 
 
 def fixed_depths(levels: SigmaLevels, h: Array) -> Array:
-    """Depths [m, downward, rising] that stand for the levels: as theirs over the deepest point, made finer."""
+    """Return rising depths [m, downward] for the levels: theirs over the deepest points, made finer."""
     known = np.isfinite(h) & (h > 0)
-    require(bool(known.any()), f"the depth of the seabed `{levels.depth.name}` is nowhere above 0")
+    require(
+        bool(known.any()),
+        f"the depth of the seabed `{levels.depth.name}` is nowhere above 0; name another `bottom` in `names`",
+    )
     parts = []
     for deep in np.unique(np.quantile(h[known], [0.02, 0.5, 1.0])):
         column = np.full((1, 1), deep)
         last, first = np.clip(-levels.ends(column, 0.0).ravel(), 0.0, deep)
-        own = np.clip(np.sort(-levels.heights(column, 0.0).ravel()), first, last)
-        edges = np.concatenate([[first], own, [last]])
+        levels_here = np.clip(np.sort(-levels.heights(column, 0.0).ravel()), first, last)
+        edges = np.concatenate([[first], levels_here, [last]])
         parts.append(np.interp(np.linspace(0, 1, FINER * edges.size), np.linspace(0, 1, edges.size), edges))
     every = np.unique(np.concatenate(parts))
-    # levels closer than a hundredth of their depth, or 10 cm, say the same
+    # levels closer than a hundredth of their depth, or 10 cm, are the same level
     kept = [every[0]]
     for depth in every[1:]:
         if depth - kept[-1] >= max(0.1, 0.01 * depth):
@@ -198,10 +214,10 @@ def fixed_depths(levels: SigmaLevels, h: Array) -> Array:
 
 
 def to_fixed(values: Values, heights: Array, h: Array, depths: Array, ends: Array) -> Values:
-    """Values (levels, ny, nx) at `heights` [m] on fixed `depths` (nz, ny, nx): linear between levels.
+    """Return values (nz, ny, nx) on fixed `depths` (nz) [m] from values (levels, ny, nx) at `heights` [m].
 
-    Held above the highest and below the lowest level as far as `ends` (2, ny, nx) [m]; NaN beyond, and under
-    the seabed at `h`.
+    They are linear between levels. Above the highest and below the lowest level they are held as far as `ends`
+    (2, ny, nx) [m]. They are NaN beyond that and below the seabed at `h`.
     """
     order = (
         slice(None) if heights.shape[0] < 2 or np.nanmean(np.diff(heights, axis=0)) > 0 else slice(None, None, -1)

@@ -8,7 +8,7 @@ KNOTS = {"knot", "knots", "kt", "kts", "kn"}
 
 
 def in_metres(units: str) -> float | None:
-    """Metres of one such unit; 1 where there is none, None where it is no length."""
+    """Return the metres in a unit; 1 for an empty unit, None if it is not a length."""
     text = units.strip().lower()
     return METRES.get(text if len(text) < 3 else text.removesuffix("s"))
 
@@ -24,18 +24,18 @@ HOURS = {
     "hour": 3600.0,
 }
 HOURS |= {"d": 86400.0, "day": 86400.0}
-"""Seconds of units of time."""
+"""Units of time in seconds."""
 SIGNS = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "·": " ", "⋅": " ", "×": " ", "{": "", "}": "", "$": ""})
 
 
 def in_seconds(units: str) -> float | None:
-    """Seconds of one such unit; None where it is no time."""
+    """Return the seconds in a unit; None if it is not a time."""
     text = units.strip().lower()
     return HOURS.get(text, HOURS.get(text.removesuffix("s")))
 
 
 def in_metres_per_second(units: str) -> float | None:
-    """m/s of one such unit; None where it is no speed."""
+    """Return the m/s in a unit; None if it is not a speed."""
     text = re.sub(r"\s+", " ", units.translate(SIGNS).strip().lower())
     if text in KNOTS:
         return 1852 / 3600

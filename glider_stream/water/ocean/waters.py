@@ -1,4 +1,4 @@
-"""The scenario's block for a flow out of current files."""
+"""The block [flow] of a scenario for currents from files."""
 
 from dataclasses import dataclass, field
 
@@ -13,9 +13,9 @@ from .reader import read_currents
 
 @dataclass(frozen=True)
 class OceanFlow:
-    """The block [flow] of kind "netcdf": `file` or files, the `epoch` (ISO 8601, UTC) of t = 0.
+    """The block [flow] of kind "netcdf": one `file` or several, and the `epoch` (ISO 8601, UTC) of t = 0.
 
-    `names` where the file does not speak for itself.
+    `names`: needed where the file's own names are not enough.
     """
 
     file: tuple[str, ...] = field(
@@ -25,8 +25,13 @@ class OceanFlow:
     names: Names | None = None
 
     def waters(self, frame: LocalFrame, lon: Range, lat: Range, depth: Range) -> tuple[OceanGrid, Bottom, str]:
-        """Flow and bottom of a domain, and a word on where they come from."""
+        """Return the flow and the bottom of a domain, and a text on their source."""
         file = read_currents(self.file, self.names, lon=lon, lat=lat, depth=depth)
         flow, bottom = ocean_waters(file, frame, lon, lat, depth, self.epoch)
-        words = [f"{file.took['u']}, {file.took['v']} of {file.name}", file.time_range, *file.words, *file.notes]
-        return flow, bottom, "; ".join(words)
+        source = [
+            f"{file.took['u']}, {file.took['v']} of {file.name}",
+            file.time_range,
+            *file.assumptions,
+            *file.notes,
+        ]
+        return flow, bottom, "; ".join(source)
