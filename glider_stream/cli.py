@@ -493,6 +493,33 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
 
 
 @cli.command()
+@click.argument("scenario")
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@click.option("--nodes", type=int, help="Nodes along the longest side of the finer grid; 101 in 2-D, 61 in 3-D.")
+@click.option(
+    "--dimensions", type=int, help="2: the mean current of a yo's depths; 3: all depths; 2 for long routes."
+)
+@JSON
+def bound(
+    scenario: str, overrides: tuple[str, ...], nodes: int | None, dimensions: int | None, as_json: bool
+) -> None:
+    """Find the least time that a route of SCENARIO can take, by a level set, with its error."""
+    from . import planner
+
+    found = planner.bound(
+        scenario,
+        overrides=overrides,
+        nodes=nodes,
+        dimensions=dimensions,
+        progress=lambda line: say(f"bound: {line}", error=True),
+    )
+    if as_json:
+        _write_json(found.as_dict())
+    else:
+        say(found)
+
+
+@cli.command()
 @click.argument("dives", type=FILE)
 @click.option(
     "--preset", default="seaglider", show_default=True, help="The vehicle to start from: seaglider or slocum."

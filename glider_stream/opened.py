@@ -27,6 +27,7 @@ from .scenario import Scenario, read_scenario, scenario_of, shipped_scenarios
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
+from .search.least_time import GreatestSpeeds, least_cost
 from .search.path import Path, load_path
 from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
@@ -164,6 +165,8 @@ class OpenedScenario:
             refine=None if asked is None else refine,
             thinned=thin,
         )
+        if path.found and path.legs:
+            path = replace(path, least=self._least(path))
         check_legs(path, outputs)
         notes: list[str] = []
         written = {
@@ -174,6 +177,14 @@ class OpenedScenario:
         for output in outputs:
             export_path(path, output, notes.append, **written)
         return replace(path, notes=tuple(notes))
+
+    def _least(self, path: Path) -> float:
+        """A bound below the cost of every route between a path's ends."""
+        problem = self.problem
+        speeds = self._once(
+            "speeds", GreatestSpeeds, lambda: GreatestSpeeds(problem, self.position, problem.departure)
+        )
+        return least_cost(speeds, path.start, path.goal, problem.evaluator.cost)
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
         """Return the costs of the cheapest paths from n points to m others: (n, m), inf where no path exists.

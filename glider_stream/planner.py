@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .evaluation import bench as benchmarks
+    from .evaluation.level_set import Bound
     from .evaluation.suite import Report
     from .roadmap.verify import Verification
     from .vehicle.calibration.result import Calibration
@@ -336,6 +337,30 @@ def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] =
     from .roadmap.verify import verify
 
     return verify(roadmap, lambda road: open_roadmap(road, overrides).problem, sample)
+
+
+def bound(
+    scenario: str | File | Scenario,
+    *,
+    overrides: Sequence[str] = (),
+    nodes: int | None = None,
+    dimensions: int | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> "Bound":
+    """Find the least time that a route of a scenario can take, by a level set, with its error.
+
+    `nodes` along the longest side of the finer grid; in 2 `dimensions`, the mean current of a yo's depths, or 3;
+    None chooses 2 for long routes.
+
+    Examples:
+        >>> bound = planner.bound("small.toml", nodes=21)
+        >>> bound.dimensions, bound.least < 486
+        (3, True)
+    """
+    from .evaluation.level_set import bound
+
+    resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
+    return bound(resolved.problem(), dimensions, nodes, progress)
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:

@@ -403,20 +403,20 @@ def refined(
 def with_added(problem: Problem, roadmap: Roadmap, parts: Sequence[tuple[Array, Edges]]) -> Roadmap:
     """A roadmap with the nodes (n, 3) [m] and the edges of some parts added; its legs stay as they are."""
     named = sum(point is not None for point in (problem.start, problem.goal))
-    before, ends = np.split(roadmap.position, [len(roadmap.position) - named])
-    at = {tuple(place): n for n, place in enumerate(np.vstack([before, *(part[0] for part in parts)]).tolist())}
-    at.update({tuple(place): -1 for place in ends.tolist()})
-    places = [place for place, n in at.items() if n >= 0]
-    position = np.vstack([np.array(places).reshape(-1, 3), ends])
-    number = {place: n for n, place in enumerate(places)}
-    number |= {tuple(place): len(places) + n for n, place in enumerate(ends.tolist())}
+    count = len(roadmap.position) - named
+    known = {tuple(place) for place in roadmap.position.tolist()}
+    added = dict.fromkeys(tuple(place) for where, _ in parts for place in where.tolist())
+    new = np.array([place for place in added if place not in known]).reshape(-1, 3)
+    position = np.vstack([roadmap.position[:count], new, roadmap.position[count:]])
+    number = {tuple(place): n for n, place in enumerate(position.tolist())}
+    own = np.arange(len(roadmap.position))
+    own[count:] += len(new)
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
     assert roadmap.node_counts is not None
-    nodes = np.arange(len(roadmap.position))
-    first = Edges(nodes, np.diff(roadmap.indptr), roadmap.target, values, roadmap.node_counts)
+    first = Edges(np.arange(len(own)), np.diff(roadmap.indptr), roadmap.target, values, roadmap.node_counts)
     keys, rows, counts = [], [], np.zeros((len(position), len(Status)), np.int32)
-    for where, edges in ((roadmap.position, first), *parts):
-        mine = np.array([number[tuple(place)] for place in where.tolist()], np.int64)
+    places = [(np.array([number[tuple(place)] for place in where.tolist()]), edges) for where, edges in parts]
+    for mine, edges in ((own, first), *places):
         keys.append(np.repeat(mine[edges.source], edges.degree) * len(position) + mine[edges.target])
         rows.append(edges.values)
         np.add.at(counts, mine[edges.source], edges.counts)

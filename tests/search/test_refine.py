@@ -23,7 +23,7 @@ from glider_stream.search.refine import Asked, Refiner, refined
 from glider_stream.search.time_dependent import ClockPlanner
 
 NOWHERE_ELSE = (None, None)
-TWO_ROUNDS = Asked(within=1e-9)
+TWO_ROUNDS = Asked(within=0.5)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def problem():
 def found():
     """Its route between the nodes, and the same refined."""
     road = glider_stream.open(roadmap())
-    return road.query(), road.query(within=0.002)
+    return road.query(), road.query(within=0.01)
 
 
 def test_a_refined_route_is_quicker_and_says_what_each_round_gained(found):
@@ -51,8 +51,8 @@ def test_a_refined_route_is_quicker_and_says_what_each_round_gained(found):
         assert one.edges > 0
         cost = one.cost
     assert after.cost == cost
-    assert all(one.gain >= 0.002 for one in after.rounds[1:-1])
-    assert after.rounds[-1].gain < 0.002
+    assert all(one.gain >= 0.01 for one in after.rounds[1:-1])
+    assert after.rounds[-1].gain < 0.01
     spacings = [one.spacing for one in after.rounds]
     assert spacings == sorted(spacings, reverse=True)
     assert [one["travel_time_s"] for one in after.as_dict()["rounds"]] == [
@@ -63,7 +63,7 @@ def test_a_refined_route_is_quicker_and_says_what_each_round_gained(found):
 
 
 def test_it_is_the_same_each_time(found):
-    again = glider_stream.open(roadmap()).query(within=0.002)
+    again = glider_stream.open(roadmap()).query(within=0.01)
     assert again.as_dict() == found[1].as_dict()
 
 
@@ -106,7 +106,7 @@ def test_where_yos_turn_at_two_depths_new_nodes_lie_there_too(problem):
     yos = replace(problem, sampler=YoSampler((0.0, 75.0, 150.0), spacing=80.0))
     road = build_roadmap(yos)
     searcher = Planner(road, yos)
-    result = refined(searcher, road, NOWHERE_ELSE, searcher.query(), Asked(within=0.5))
+    result = refined(searcher, road, NOWHERE_ELSE, searcher.query(), TWO_ROUNDS)
     assert set(result.parts[0][0][:, 2]) == {0.0, -75.0, -150.0}
 
 
@@ -118,7 +118,7 @@ def test_new_nodes_lie_only_where_a_route_may_be_as_quick(problem):
     # the sums are exact: at the start, at the goal, and along the best route they are what it costs
     best = searcher.query()
     np.testing.assert_allclose(cloud.sums()[refiner._stops(cloud, best)], best.cost)
-    (where, _), *_ = refiner.refine(best, Asked(within=0.5), lambda line: None).parts
+    (where, _), *_ = refiner.refine(best, TWO_ROUNDS, lambda line: None).parts
     corner = np.array([problem.hi[0], problem.hi[1]])
     assert np.hypot(*(where[:, :2] - corner).T).min() > 150.0
 
@@ -140,7 +140,7 @@ def test_the_clock_runs_while_a_route_is_refined(problem, gyre):
     position = node_positions(swinging)
     searcher = ClockPlanner(swinging, position)
     before = searcher.query()
-    result = refined(searcher, None, NOWHERE_ELSE, before, Asked(within=0.5))
+    result = refined(searcher, None, NOWHERE_ELSE, before, TWO_ROUNDS)
     after = result.path
     assert after.travel_time < before.travel_time
     assert after.clock_runs
@@ -195,3 +195,13 @@ def test_what_cannot_be_refined_is_refused(tmp_path):
     ):
         with pytest.raises(InputError, match=words):
             road.query(**asked)
+
+
+def test_every_query_tells_how_far_from_the_best_it_may_be(found):
+    before, after = found
+    assert before.least < after.cost
+    assert before.as_dict()["lower_bound"]["cost"] == before.least
+    assert "estimate_of_further_gain" not in before.as_dict()
+    assert after.as_dict()["estimate_of_further_gain"] == after.rounds[-1].gain
+    assert "by the greatest currents: this one at most" in str(before)
+    assert str(after).endswith("%, an estimate")
