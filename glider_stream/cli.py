@@ -137,7 +137,8 @@ def build(
             done = f"part {shard} of a roadmap"
         else:
             road = planner.build(scenario, output, progress=progress, **run)
-            done, empty = str(road), planner.why_no_edges(road)
+            dense = planner.density(road)
+            done, empty = f"{road}\n  dense:  {dense}", planner.why_no_edges(road) or dense.warning
     say(f"{done}\n  file:   {output}")
     if empty:
         say(f"note: {empty}", error=True)

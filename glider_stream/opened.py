@@ -20,6 +20,7 @@ from .pilot.score import score as score_of
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import node_positions
+from .roadmap.density import Density, density_of
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
@@ -33,6 +34,7 @@ from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .search.why_not import no_edges
+from .vehicle.polar import polar
 from .water.domain import GeographicDomain, Point
 
 if TYPE_CHECKING:
@@ -150,7 +152,7 @@ class OpenedScenario:
         outputs, roadmaps = split_outputs(outputs, asked is not None)
         planner, ends = self.planner(surfacing), self._ends(start, goal)
 
-        def refine(path: Path, polish: Callable[[Path], Path]) -> Path:
+        def refine(path: Path, polish: Callable[[Path], Path] | None) -> Path:
             assert asked is not None
             found = refined(planner, self._roadmap, ends, path, asked, polish, progress)
             for file in roadmaps:
@@ -405,6 +407,15 @@ class OpenedRoadmap(OpenedScenario):
             ''
         """
         return "" if self.roadmap.target.size else no_edges(self.roadmap, self.problem)
+
+    def density(self) -> Density:
+        """Return how far nodes lie apart in the vehicle's legs, and in how many directions legs leave them.
+
+        Examples:
+            >>> print(road.density())
+            nodes 87 m apart at a depth, 0.41 legs; legs in 12 of 36 directions from a node
+        """
+        return density_of(self.roadmap, float(polar(self.scenario.glider).best_angle.max()))
 
     def __str__(self) -> str:
         return str(self.roadmap)

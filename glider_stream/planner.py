@@ -20,6 +20,7 @@ from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import Progress, build_roadmap, node_positions
 from .roadmap.compare import Difference, difference
+from .roadmap.density import Density
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
 from .roadmap.store import read_roadmap
@@ -323,6 +324,16 @@ def why_no_edges(roadmap: AnyRoadmap) -> str:
         ''
     """
     return open_roadmap(roadmap).why_no_edges()
+
+
+def density(roadmap: AnyRoadmap) -> Density:
+    """Return how far a roadmap's nodes lie apart in legs, and in how many directions legs leave them.
+
+    Examples:
+        >>> planner.density("small.h5").warning
+        ''
+    """
+    return open_roadmap(roadmap).density()
 
 
 def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":

@@ -23,8 +23,8 @@ from .trade_off import TradeOff
 
 Ends = tuple[Array | None, Array | None]
 """Start and goal (3,) [m]; None for the scenario's own."""
-Refinement = Callable[[Path, Callable[[Path], Path]], Path]
-"""Refines a path; each round's route goes through the second."""
+Refinement = Callable[[Path, Callable[[Path], Path] | None], Path]
+"""Refines a path; each round's routes go through the second, if there is one."""
 
 
 def planner_of(problem: Problem, roadmap: Roadmap | None, rule: Surfacing) -> RoutePlanner:
@@ -66,7 +66,7 @@ def best_path(
         _check_energy(planner)
         path = planner.within(*ends, most_energy)
     if refine is not None:
-        path = refine(path, (lambda one: polished(one, planner)) if polish else (lambda one: one))
+        path = refine(path, (lambda one: polished(one, planner)) if polish else None)
     elif polish:
         path = polished(path, planner)
     return path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)

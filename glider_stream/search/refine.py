@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path as File
 from typing import NamedTuple
 
@@ -24,7 +25,7 @@ from scipy.spatial import KDTree
 from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import threads
-from ..kernels.edges import COST, STATUS, TIME, Status
+from ..kernels.edges import COST, STATUS, TIME, Edge, Status
 from ..kernels.flow import velocities
 from ..roadmap.builder import Tally, build_roadmap, find_edges, roadmap_of
 from ..roadmap.neighbours import Reachable
@@ -37,18 +38,22 @@ from ..roadmap.store import write_roadmap
 from .assembly import RoutePlanner, nodes_at, placed_end
 from .layered import SurfacingPlanner
 from .least_time import fastest_sink
-from .path import Path, Round
+from .path import Hop, Path, Round
 from .query import Planner
 from .surfacing import Surfacing
 from .time_dependent import ClockPlanner
 
-FINER = 0.6
-"""Each round's spacing, in that of the round before."""
+FINER, COARSEST = 0.6, 0.95
+"""Each round's spacing, in that of the round before; at most, where finer ones would have too many legs."""
+WORTH = 0.1
+"""A round's route is polished where it costs more than the best by no more than such a share."""
 WIDEST, NARROWEST = 0.03, 0.003
 """Nodes are placed where a route through them may cost more than the best by such a share: by as much as the last
 round gained, between these."""
 MOST_PAIRS = 600_000
 """Legs of a round, about: where there would be more, nodes are placed only where they promise most."""
+FEW_LEGS, OTHERS = 24, 3
+"""A route of so few legs is polished from others too, so many a round."""
 LEAST_NODES = 1000
 """A round has so many nodes, whatever their legs."""
 FEWEST_ROUNDS, MOST_ROUNDS = 2, 12
@@ -151,10 +156,10 @@ class _Cells:
         random = np.random.default_rng([problem.sampler.seed, 19])
         return cls(spacing, max(rise, 1e-6), ends if between else levels, between, random)
 
-    def finer(self) -> "_Cells":
-        """The cells of the next round."""
-        rise = FINER * self.rise if self.between else self.rise
-        return replace(self, spacing=FINER * self.spacing, rise=rise)
+    def finer(self, share: float) -> "_Cells":
+        """The cells of the next round, of such a share of the width."""
+        rise = share * self.rise if self.between else self.rise
+        return replace(self, spacing=share * self.spacing, rise=rise)
 
     def scale(self) -> Array:
         """What counts as near along x, y, z (3,) [m]."""
@@ -180,9 +185,9 @@ class Refiner:
         roadmap: Roadmap | None,
         start: Array,
         goal: Array,
-        polish: Callable[[Path], Path] = lambda path: path,
+        polish: Callable[[Path], Path] | None = None,
     ) -> None:
-        """Nothing is done yet; each round's route goes through `polish`."""
+        """Nothing is done yet; each round's routes go through `polish`, if there is one."""
         self.polish = polish
         self.planner, self.problem, self.roadmap = planner, planner.problem, roadmap
         self.start, self.goal = start, goal
@@ -191,24 +196,26 @@ class Refiner:
     def refine(self, path: Path, asked: Asked, tell: Callable[[str], None]) -> Refined:
         """The best route when refinement ends; the path itself, polished, where nothing is gained."""
         began = time.perf_counter()
-        cloud = self._first()
-        cells, gain, degree = _Cells.of(self.problem, cloud.position[:-2]), WIDEST, 1.0
-        best, by_nodes = self.polish(path), path
+        cloud, degree = self._first()
+        cells, gain = _Cells.of(self.problem, cloud.position[:-2]), WIDEST
+        polish = (lambda one: one) if self.polish is None else self.polish
+        best, by_nodes = polish(path), path
         rounds: list[Round] = []
         parts: list[tuple[Array, Edges]] = []
         while len(rounds) < MOST_ROUNDS:
             since = time.perf_counter()
-            cells, share = cells.finer(), min(max(gain, NARROWEST), WIDEST)
-            guess = self._placed(cloud, cells, by_nodes, share, degree)
+            share = min(max(gain, NARROWEST), WIDEST)
+            guess, cells = self._placed(cloud, cells, by_nodes, share, degree)
             problem = self._problem_of(by_nodes)
             edges = self._edges(problem, guess, cells)
             cloud = self._known(problem, guess.position, edges)
             parts.append((guess.position, edges))
-            degree = max(1.0, edges.target.size / len(cloud.position)) / FINER ** (3 if cells.between else 2)
+            degree = max(1.0, edges.target.size / len(cloud.position))
             found = self._route(problem, cloud, edges, share)
             gain, before = max(0.0, 1 - found.cost / by_nodes.cost), best.cost
-            if found.cost < by_nodes.cost:
-                by_nodes, polished = found, self.polish(found)
+            by_nodes = found if found.cost < by_nodes.cost else by_nodes
+            for start in self._starts(found, best, cloud, edges):
+                polished = polish(start)
                 best = polished if polished.cost < best.cost else best
             saved = 1 - best.cost / before
             size = len(cloud.position), int(edges.target.size)
@@ -222,8 +229,41 @@ class Refiner:
         road = None if self.clock else self.roadmap
         return Refined(replace(best, rounds=tuple(rounds)), self.problem, road, tuple(parts))
 
-    def _first(self) -> _Cloud:
-        """What the nodes that are there say."""
+    def _starts(self, found: Path, best: Path, cloud: _Cloud, edges: Edges) -> list[Path]:
+        """The routes of a round that are worth polishing: the best, and where legs are few others, far from it.
+
+        Polishing finds the best route near the one that it begins with, and another may end better.
+        """
+        starts = [found] if found.cost < (1 + WORTH) * best.cost else []
+        if not starts or self.polish is None or self.clock or len(found.legs) > FEW_LEGS:
+            return starts
+        count, (start, goal) = len(cloud.position), np.arange(len(cloud.position))[-2:]
+        ways = edges.values[:, 1], (np.repeat(edges.source, edges.degree), edges.target)
+        graph = csr_array(ways, shape=(count, count))
+        back = dijkstra(graph, indices=[start], return_predecessors=True)[1][0]
+        ahead = dijkstra(graph.T.tocsr(), indices=[goal], return_predecessors=True)[1][0]
+        near = np.flatnonzero(cloud.sums() <= (1 + WIDEST) * cloud.sums().min())
+        passed = found.trajectory[:, 1:]
+        for _ in range(OTHERS):
+            far = KDTree(passed).query(cloud.position[near])[0]
+            node = near[int(np.argmax(far))]
+            nodes = _chain(int(node), back)[::-1] + _chain(int(node), ahead)[1:]
+            starts.append(self.planner.fly(self._hops(cloud, edges, nodes)))
+            passed = np.vstack([passed, starts[-1].trajectory[:, 1:]])
+        return starts
+
+    def _hops(self, cloud: _Cloud, edges: Edges, nodes: list[int]) -> list[Hop]:
+        """The legs between some nodes, one after the other."""
+        first, hops = np.concatenate([[0], np.cumsum(edges.degree)]), []
+        for source, target in pairwise(nodes):
+            row = slice(first[source], first[source + 1])
+            n = int(first[source] + np.flatnonzero(edges.target[row] == target)[0])
+            edge = Edge(int(Status.CONNECTED), *map(float, edges.values[n]))
+            hops.append((cloud.position[source], cloud.position[target], edge))
+        return hops
+
+    def _first(self) -> tuple[_Cloud, float]:
+        """What the nodes that are there say, and how many legs leave one."""
         problem = self.problem
         if self.clock:
             assert isinstance(self.planner, ClockPlanner)
@@ -240,7 +280,8 @@ class Refiner:
             position = road.position
             source, target = np.repeat(np.arange(len(position)), np.diff(road.indptr)), road.target
             costs, times = road.cost, road.time
-        return self._with_ends(position, source, target.astype(np.int64), costs, times)
+        cloud = self._with_ends(position, source, target.astype(np.int64), costs, times)
+        return cloud, max(1.0, len(source) / len(position))
 
     def _with_ends(self, position: Array, source: Index, target: Index, costs: Array, times: Array) -> _Cloud:
         """The cloud of edges among nodes, once start and goal are the last two nodes."""
@@ -266,19 +307,33 @@ class Refiner:
         order = np.concatenate([np.setdiff1d(np.arange(count), ends), ends]).astype(np.int64)
         return _Cloud(everywhere[order], since[order], left[order], self.problem.departure + when[order])
 
-    def _placed(self, cloud: _Cloud, cells: _Cells, best: Path, share: float, degree: float) -> _Cloud:
+    def _placed(
+        self, cloud: _Cloud, before: _Cells, best: Path, share: float, degree: float
+    ) -> tuple[_Cloud, _Cells]:
         """The nodes of a round, start and goal the last two, as far as they are known from the nodes around."""
-        sums, scale = cloud.sums(), cells.scale() / FINER
+        sums, scale = cloud.sums(), before.scale()
         stops = self._stops(cloud, best)
         most = (1 + share) * (float(sums[stops].max()) if stops.size else best.cost)
         near = np.flatnonzero(sums <= most)
-        new = cells.places(*self._box(cloud.position[near], cells, scale))
         tree = KDTree(cloud.position[np.isfinite(sums)] / scale)
-        nearby = tree.query(new / scale, k=NEAR_COUNT, distance_upper_bound=NEAR)
-        far, around = (np.asarray(part) for part in nearby)
-        at = np.isfinite(far)
-        promise = np.where(at, np.append(sums[np.isfinite(sums)], np.inf)[around], np.inf).min(axis=1)
-        chosen = np.flatnonzero(promise <= most)
+        box = self._box(cloud.position[near], scale)
+        finer = FINER
+        while True:
+            cells = before.finer(finer)
+            new = cells.places(*box)
+            nearby = tree.query(new / scale, k=NEAR_COUNT, distance_upper_bound=NEAR)
+            far, around = (np.asarray(part) for part in nearby)
+            at = np.isfinite(far)
+            promise = np.where(at, np.append(sums[np.isfinite(sums)], np.inf)[around], np.inf).min(axis=1)
+            chosen = np.flatnonzero(promise <= most)
+            # a node has as many more legs as nodes are denser
+            ratio = finer ** -(3 if cells.between else 2)
+            pairs = (len(chosen) + len(near)) * degree * ratio
+            if pairs <= MOST_PAIRS or finer >= COARSEST:
+                break
+            finer = min(
+                COARSEST, max(1.02 * finer, finer * (pairs / MOST_PAIRS) ** (0.5 / (3 if cells.between else 2)))
+            )
         chosen = chosen[self.problem.evaluator.allowed(new[chosen], self.problem.departure)]
         at, around = at[chosen], around[chosen]
 
@@ -295,12 +350,12 @@ class Refiner:
         stays[stops], stays[count - 2 : count] = True, False
         order = np.concatenate([sums, promise[chosen]])
         order[stays], order[count - 2 : count] = -np.inf, np.inf
-        room = max(LEAST_NODES, int(MOST_PAIRS / degree))
+        room = max(LEAST_NODES, int(MOST_PAIRS / (degree * ratio)))
         kept = np.argsort(order, kind="stable")[:room]
         kept = np.append(np.sort(kept[order[kept] <= most]), [count - 2, count - 1])
-        return _Cloud(*(values[kept] for values in every))
+        return _Cloud(*(values[kept] for values in every)), cells
 
-    def _box(self, position: Array, cells: _Cells, scale: Array) -> tuple[Array, Array]:
+    def _box(self, position: Array, scale: Array) -> tuple[Array, Array]:
         """The box (3,) [m] about some nodes, and a spacing more, that new ones are placed in."""
         lo, hi = self.problem.lo.astype(float), self.problem.hi.astype(float)
         hi[2] = min(hi[2], 0.0)
@@ -373,6 +428,14 @@ class Refiner:
         return planner.query(self.start, self.goal)
 
 
+def _chain(node: int, following: Array) -> list[int]:
+    """A node and all that follow it."""
+    nodes = [node]
+    while following[nodes[-1]] >= 0:
+        nodes.append(int(following[nodes[-1]]))
+    return nodes
+
+
 def _costs(
     count: int, source: Index, target: Index, costs: Array, times: Array, start: int, goal: int
 ) -> tuple[Array, Array, Array]:
@@ -389,7 +452,7 @@ def refined(
     ends: tuple[Array | None, Array | None],
     path: Path,
     asked: Asked,
-    polish: Callable[[Path], Path] = lambda path: path,
+    polish: Callable[[Path], Path] | None = None,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Refined:
     """A path that `planner` found, in a `roadmap` if there is one, refined; as it is where there is none."""
