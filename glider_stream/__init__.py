@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .roadmap.builder import build_roadmap
     from .roadmap.problem import Problem
     from .roadmap.roadmap import Roadmap
+    from .roadmap.slices import SlicedRoadmap
     from .roadmap.store import read_roadmap, write_roadmap
     from .scenario import Scenario, read_scenario, shipped_scenarios
     from .search.path import Leg, Path
@@ -37,6 +38,7 @@ __all__ = [
     "Problem",
     "Roadmap",
     "Scenario",
+    "SlicedRoadmap",
     "Status",
     "Surfacing",
     "__version__",
@@ -55,6 +57,7 @@ _HOMES = {
     "roadmap.builder": ("build_roadmap",),
     "roadmap.problem": ("Problem",),
     "roadmap.roadmap": ("Roadmap",),
+    "roadmap.slices": ("SlicedRoadmap",),
     "roadmap.store": ("read_roadmap", "write_roadmap"),
     "scenario": ("Scenario", "read_scenario", "shipped_scenarios"),
     "search.path": ("Leg", "Path"),

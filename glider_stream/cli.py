@@ -115,9 +115,10 @@ def build(
     scheduler: str | None,
     checkpoint: float | None,
 ) -> None:
-    """Build the roadmap of SCENARIO: a TOML file, or the name of a shipped one.
+    """Build the roadmap of SCENARIO.
 
-    Results are kept beside the output until it is complete. The same command continues a stopped build.
+    SCENARIO is a TOML file or the name of a shipped scenario, such as seed-box. Results are kept beside the
+    output until it is complete: the same command continues a stopped build.
     """
     from . import planner
     from .base.progress import reporter
@@ -148,7 +149,10 @@ def build(
 @click.argument("parts", nargs=-1, required=True, type=FILE)
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 def merge(parts: tuple[Path, ...], output: Path) -> None:
-    """Merge PARTS, which `build --shard` wrote, into one roadmap."""
+    """Merge PARTS into one roadmap.
+
+    PARTS are the files that `build --shard` wrote.
+    """
     from . import planner
 
     road = planner.merge(parts, output)
@@ -160,7 +164,19 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 ROUTE_OPTIONS = (
     click.option("--start", type=place, metavar="X,Y,Z", help="Metres, z upward; LON,LAT,DEPTH if geographic."),
     click.option("--goal", type=place, metavar="X,Y,Z", help="The goal, in the same form as --start."),
-    click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write."),
+    click.option(
+        "--depart",
+        metavar="T",
+        help="The departure, in place of query.departure: seconds of the flow, or a date (UTC).",
+    ),
+    click.option(
+        "-o",
+        "--output",
+        "outputs",
+        multiple=True,
+        type=FILE,
+        help="A route file to write: .json, .csv, .geojson, .kml, .gpx, goto_l10.ma, targets, ...; repeatable.",
+    ),
     click.option(
         "--most-energy",
         type=float,
@@ -236,22 +252,50 @@ def route_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @ROADMAP
 @ELSEWHERE
 @route_options
-def query(roadmap: Path, overrides: tuple[str, ...], **asked: Any) -> None:
-    """Find the cheapest path in ROADMAP, from --start to --goal or between the scenario's own points."""
+def query(roadmap: Path, overrides: tuple[str, ...], **options: Any) -> None:
+    """Find the cheapest path in ROADMAP.
+
+    It leads from --start to --goal; without these, between the scenario's own points.
+    """
     from .opened import open
 
-    _answer(lambda: open(roadmap, overrides), **asked)
+    _answer(lambda: open(roadmap, overrides), **options)
 
 
 @cli.command()
 @click.argument("scenario")
 @route_options
 @click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
-def plan(scenario: str, overrides: tuple[str, ...], **asked: Any) -> None:
-    """Find a route of SCENARIO without a roadmap: each leg leaves when the last one arrives."""
+def plan(scenario: str, overrides: tuple[str, ...], **options: Any) -> None:
+    """Find a route of SCENARIO without a roadmap.
+
+    SCENARIO is a TOML file or the name of a shipped scenario. Each leg leaves when the last one arrives.
+    """
     from .opened import open_scenario
 
-    _answer(lambda: open_scenario(scenario, overrides), **asked)
+    _answer(lambda: open_scenario(scenario, overrides), **options)
+
+
+def _check_together(front: bool, departures: bool, alone: bool, spacing: bool) -> None:
+    """Raise UsageError if options of a route cannot be used together.
+
+    `front`: --trade-off; `departures`: --depart-between or --arrive-by; `alone`: no option that needs one route;
+    `spacing`: --every or --figure.
+    """
+    if front and (departures or not alone):
+        raise click.UsageError(
+            "--trade-off cannot be used with --output, --most-energy, --polish, --within, --seconds, --thin, "
+            "--card, --window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one "
+            "of them out"
+        )
+    if departures and not alone:
+        raise click.UsageError(
+            "--depart-between and --arrive-by cannot be used with --output, --most-energy, --polish, --within, "
+            "--seconds, --thin, --card, --window-hours, --waypoints and --arrival-radius; set query.departure to "
+            "the departure that they find"
+        )
+    if spacing and not departures:
+        raise click.UsageError("--every and --figure need --depart-between or --arrive-by; add one of them")
 
 
 def _answer(
@@ -259,6 +303,7 @@ def _answer(
     *,
     start: Any,
     goal: Any,
+    depart: str | None,
     outputs: tuple[Path, ...],
     most_energy: float | None,
     most_yos: int | None,
@@ -287,25 +332,15 @@ def _answer(
     departures = depart_between is not None or arrive_by is not None
     answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
-    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     refines = within is not None or seconds is not None
-    alone = not (outputs or polish or refines or asked or as_card) and most_energy is None and thin is None
-    if front and (departures or not alone):
-        raise click.UsageError(
-            "--trade-off cannot be used with --output, --most-energy, --polish, --within, --seconds, --thin, "
-            "--card, --window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one "
-            "of them out"
-        )
-    if departures and not alone:
-        raise click.UsageError(
-            "--depart-between and --arrive-by cannot be used with --output, --most-energy, --polish, --within, "
-            "--seconds, --thin, --card, --window-hours, --waypoints and --arrival-radius; set query.departure to "
-            "the departure that they find"
-        )
-    if not departures and (every is not None or figure is not None):
-        raise click.UsageError("--every and --figure need --depart-between or --arrive-by; add one of them")
+    alone = not (outputs or polish or refines or options or as_card) and most_energy is None and thin is None
+    spacing = every is not None or figure is not None
+    _check_together(front, departures, alone, spacing)
+    if departures and depart is not None:
+        raise click.UsageError("--depart cannot be used with --depart-between or --arrive-by; leave it out")
     if front:
-        corners = opened().trade_off(start, goal, surfacing=rule)
+        corners = opened().trade_off(start, goal, depart=depart, surfacing=rule)
         answer, found = (corners, True) if corners.paths[0].found else (corners.paths[0], False)
     elif departures:
         ends: dict[str, Any] = {"start": start, "goal": goal, "surfacing": rule}
@@ -314,19 +349,9 @@ def _answer(
     else:
         split_outputs(outputs, refines)
         source = opened()
-        path = source.query(
-            start,
-            goal,
-            outputs=outputs,
-            most_energy=most_energy,
-            polish=polish,
-            within=within,
-            seconds=seconds,
-            progress=lambda line: say(line, error=True),
-            thin=thin,
-            surfacing=rule,
-            **asked,
-        )
+        options |= {"most_energy": most_energy, "polish": polish, "thin": thin, "surfacing": rule}
+        options |= {"within": within, "seconds": seconds, "progress": lambda line: say(line, error=True)}
+        path = source.query(start, goal, depart=depart, outputs=outputs, **options)
         for note in path.notes:
             say(f"note: {note}", error=True)
         answer, found = source.card(path) if as_card and path.found else path, path.found
@@ -367,7 +392,10 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
 )
 @JSON
 def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool) -> None:
-    """Fly the legs of ROADMAP again, a sample by another integrator; exit code 1 if a leg differs."""
+    """Fly the legs of ROADMAP again.
+
+    A sample of them is flown by another integrator. Exit code 1 if a leg differs.
+    """
     from . import planner
 
     verification = planner.verify(roadmap, sample, overrides=overrides)
@@ -400,9 +428,10 @@ def plot(
     chart: bool,
     fronts: float | None,
 ) -> None:
-    """Draw the route in PATHS (JSON, from query) over ROADMAP's current; without PATHS, the roadmap.
+    """Draw the route in PATHS, or ROADMAP.
 
-    Two to four files are drawn side by side, to compare the routes.
+    PATHS are JSON files from `query`. One route is drawn over ROADMAP's current, two to four are drawn side by
+    side; without PATHS, the roadmap is drawn.
     """
     from . import planner
 
@@ -439,7 +468,10 @@ def plot(
 def describe(
     currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
 ) -> None:
-    """Show what the current files CURRENTS hold, and how the planner reads them."""
+    """Show what the current files CURRENTS hold.
+
+    The output also shows how the planner reads them.
+    """
     from . import planner
 
     description = planner.describe(currents, [(*place, None)[:4] for place in at], dict(names))
@@ -459,15 +491,24 @@ def describe(
     metavar="X,Y,Z",
     help="The vehicle's position before ROUTE, in the same form as for `query`.",
 )
+@click.option("--depart", metavar="T", help="The departure, in the same form as for `query`.")
 @JSON
-def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], start: Any, as_json: bool) -> None:
-    """Fly the drawn ROUTE in the water of ROADMAP; exit code 1 if a leg fails.
+def score(
+    roadmap: Path,
+    overrides: tuple[str, ...],
+    route: tuple[Path, ...],
+    start: Any,
+    depart: str | None,
+    as_json: bool,
+) -> None:
+    """Fly the drawn ROUTE in the water of ROADMAP.
 
-    CSV, GeoJSON, KML, GPX, a path file, goto lists or targets; several files are one route.
+    ROUTE is a CSV, GeoJSON, KML or GPX file, a path file, goto lists or targets; several files are one route.
+    Exit code 1 if a leg fails.
     """
     from .opened import open_either
 
-    found = open_either(roadmap, overrides).score(route, start)
+    found = open_either(roadmap, overrides).score(route, start, depart=depart)
     if as_json:
         _write_json(found.as_dict())
     else:
@@ -481,7 +522,10 @@ def score(roadmap: Path, overrides: tuple[str, ...], route: tuple[Path, ...], st
 @click.option("--waypoints", type=int, default=8, show_default=True, help="The most waypoints in a goto list.")
 @JSON
 def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
-    """Check FILES that vehicles fly (goto lists, yo files, targets); exit code 1 if there are faults."""
+    """Find faults in FILES that vehicles fly.
+
+    FILES are goto lists, yo files or targets. Exit code 1 if there are faults.
+    """
     from . import planner
 
     looked = planner.lint(files, waypoints)
@@ -538,7 +582,10 @@ def bound(
 def calibrate(
     dives: Path, preset: str, columns: tuple[tuple[str, Any], ...], output: Path | None, as_json: bool
 ) -> None:
-    """Fit the buoyancy or drag and the lift of a vehicle to DIVES, a CSV file of its dives."""
+    """Fit a vehicle to DIVES, a CSV file of its dives.
+
+    The fit finds the vehicle's buoyancy or drag, and its lift.
+    """
     from . import planner
 
     found = planner.calibrate(
@@ -569,12 +616,15 @@ def bench(
     against: Path | None,
     output: Path | None,
 ) -> None:
-    """Measure the speed of this machine, or the quality of routes; let nothing else run meanwhile."""
+    """Measure this machine, or the quality of routes.
+
+    Let nothing else run meanwhile.
+    """
     from . import planner
 
     if suite:
-        alien = {"--runs": runs, "--ceiling": ceiling, "--against": against}
-        for name, value in alien.items():
+        unusable = {"--runs": runs, "--ceiling": ceiling, "--against": against}
+        for name, value in unusable.items():
             if value is not None:
                 raise click.UsageError(f"{name} does not go with --suite; leave one of them out")
         report = planner.suite(

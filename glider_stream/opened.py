@@ -23,7 +23,8 @@ from .roadmap.builder import node_positions
 from .roadmap.density import Density, density_of
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
-from .roadmap.store import read_roadmap
+from .roadmap.slices import SlicedRoadmap
+from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario, scenario_of, shipped_scenarios
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
@@ -36,6 +37,7 @@ from .search.trade_off import TradeOff
 from .search.why_not import no_edges
 from .vehicle.polar import polar
 from .water.domain import GeographicDomain, Point
+from .water.inspect import is_steady
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -99,8 +101,26 @@ class OpenedScenario:
         rule = self._surfacing if surfacing is None else surfacing
         return self._once(rule, RoutePlanner, lambda: planner_of(self.problem, self._roadmap, rule))  # type: ignore[type-abstract]
 
+    def _leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
+        """`planner` for routes that leave at a time, the scenario's departure if None."""
+        problem, road = self.problem, self._roadmap
+        since = 0.0 if depart is None else seconds(depart, problem, "depart") - problem.departure
+        changes = not is_steady(problem.evaluator.flow)
+        if since == 0.0 or (changes and not problem.frozen):
+            planner = self.planner(surfacing)
+            return planner.leaving(since) if since else planner
+        fits = not (changes and isinstance(road, Roadmap))
+        legs = f"frozen paths over this roadmap leave at {problem.departure:g} s"
+        require(fits, f"{legs}; got {depart}; leave `query.frozen` out, or build it with that `query.departure`")
+        return planner_of(problem.leaving(since), road, self._surfacing if surfacing is None else surfacing)
+
+    def _problem_of(self, route: Path) -> Problem:
+        """The problem at the time at which a route leaves, where it says that."""
+        problem = self.problem
+        return problem if route.departure is None else problem.leaving(route.departure - problem.departure)
+
     @property
-    def _roadmap(self) -> Roadmap | None:
+    def _roadmap(self) -> Roadmap | SlicedRoadmap | None:
         return None
 
     @property
@@ -119,6 +139,7 @@ class OpenedScenario:
         start: Point | None = None,
         goal: Point | None = None,
         *,
+        depart: Moment | None = None,
         outputs: Sequence[str | File] = (),
         most_energy: float | None = None,
         polish: bool = False,
@@ -133,6 +154,7 @@ class OpenedScenario:
     ) -> Path:
         """Return the cheapest path between two points, and write it to each of `outputs`.
 
+        `depart`: the departure, in seconds of the flow or an ISO 8601 text (UTC); None stands for the scenario's.
         `most_energy` [J]: take the fastest of the paths of `trade_off` that uses no more. `polish`: move the
         stops off the nodes, cut legs and count yos anew, as long as the cost falls. `within`: add nodes where
         they can help, in rounds, until a round gains less than this share of the cost, 0.01 for 1 %. `seconds`:
@@ -150,11 +172,11 @@ class OpenedScenario:
         """
         asked = None if within is None and seconds is None else Asked(within, seconds)
         outputs, roadmaps = split_outputs(outputs, asked is not None)
-        planner, ends = self.planner(surfacing), self._ends(start, goal)
+        planner, ends = self._leaving(depart, surfacing), self._ends(start, goal)
 
         def refine(path: Path, polish: Callable[[Path], Path] | None) -> Path:
             assert asked is not None
-            found = refined(planner, self._roadmap, ends, path, asked, polish, progress)
+            found = refined(planner, ends, path, asked, polish, progress)
             for file in roadmaps:
                 found.write(file)
             return found.path
@@ -168,7 +190,7 @@ class OpenedScenario:
             thinned=thin,
         )
         if path.found and path.legs:
-            path = replace(path, least=self._least(path))
+            path = replace(path, least=self._least(path, planner.problem.departure))
         check_legs(path, outputs)
         notes: list[str] = []
         written = {
@@ -178,37 +200,46 @@ class OpenedScenario:
         }
         for output in outputs:
             export_path(path, output, notes.append, **written)
-        return replace(path, notes=tuple(notes))
+        return replace(path, notes=(*path.notes, *notes))
 
-    def _least(self, path: Path) -> float:
-        """A bound below the cost of every route between a path's ends."""
+    def _least(self, path: Path, departure: float) -> float:
+        """A bound below the cost of every route between a path's ends that leaves at a departure [s]."""
         problem = self.problem
         speeds = self._once(
-            "speeds", GreatestSpeeds, lambda: GreatestSpeeds(problem, self.position, problem.departure)
+            ("speeds", departure), GreatestSpeeds, lambda: GreatestSpeeds(problem, self.position, departure)
         )
         return least_cost(speeds, path.start, path.goal, problem.evaluator.cost)
 
-    def table(self, starts: Sequence[Point], goals: Sequence[Point]) -> Array:
+    def table(self, starts: Sequence[Point], goals: Sequence[Point], *, depart: Moment | None = None) -> Array:
         """Return the costs of the cheapest paths from n points to m others: (n, m), inf where no path exists.
+
+        They leave at `depart`, as in `query`.
 
         Examples:
             >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
             array([[430., 382.]])
         """
-        free = self.planner(Surfacing())
+        free = self._leaving(depart, Surfacing())
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
-    def arrivals(self, start: Point | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot.
+    def arrivals(self, start: Point | None = None, *, depart: Moment | None = None) -> Array:
+        """When each node (n,) can be reached from a point at the soonest [s from departure]; inf where not.
+
+        Gliders leave at `depart`, as in `query`.
 
         Examples:
             >>> int((road.arrivals() < 300).sum())
             18
         """
-        return self.planner(Surfacing()).arrivals(None if start is None else self._point(start))
+        return self._leaving(depart, Surfacing()).arrivals(None if start is None else self._point(start))
 
     def trade_off(
-        self, start: Point | None = None, goal: Point | None = None, *, surfacing: Surfacing | None = None
+        self,
+        start: Point | None = None,
+        goal: Point | None = None,
+        *,
+        depart: Moment | None = None,
+        surfacing: Surfacing | None = None,
     ) -> TradeOff:
         """Return all paths of one query that no other path beats in both time and energy; see `query`.
 
@@ -217,7 +248,7 @@ class OpenedScenario:
             >>> [len(path.legs) for path in glider_stream.open(energy).trade_off().paths]
             [4]
         """
-        return front(self.planner(surfacing), self._ends(start, goal))
+        return front(self._leaving(depart, surfacing), self._ends(start, goal))
 
     def card(self, path: Path) -> Card:
         """Return the card of a route of this roadmap: speed over ground and currents, leg by leg.
@@ -227,12 +258,19 @@ class OpenedScenario:
             leg   hours  over ground ...
             ...
         """
-        return card_of(path, self.problem)
+        return card_of(path, self._problem_of(path))
 
-    def score(self, route: str | File | Sequence[str | File], start: Point | None = None) -> Score:
+    def score(
+        self,
+        route: str | File | Sequence[str | File],
+        start: Point | None = None,
+        *,
+        depart: Moment | None = None,
+    ) -> Score:
         """Fly a drawn route (CSV, GeoJSON, KML, GPX, a path file, goto lists, targets) in the roadmap's water.
 
-        Several files are one route, one after another. `start` is where the vehicle is, before its first point.
+        Several files are one route, one after another. `start` is where the vehicle is, before its first point;
+        it leaves at `depart`, as in `query`.
 
         Examples:
             >>> _ = road.query(outputs=["path.json"])
@@ -242,7 +280,7 @@ class OpenedScenario:
         files = [route] if isinstance(route, str | File) else list(route)
         drawn = [read_drawn(file) for file in files]
         # a drawn route may begin or end anywhere, so it does not keep the rule of surfacing
-        planner, domain = self.planner(Surfacing()), self.scenario.domain
+        planner, domain = self._leaving(depart, Surfacing()), self.scenario.domain
         on_globe = isinstance(domain, GeographicDomain)
         cure = "and the roadmap is in metres; give x, y, z in a CSV file"
         points = [] if start is None else [self._point(start)]
@@ -335,10 +373,19 @@ class OpenedScenario:
         if route is None:
             cure = "draw a route over it, or build its roadmap"
             require(self._roadmap is not None, f"a scenario has no roadmap to draw; {cure}")
-            assert self._roadmap is not None
-            return draw_roadmap(self._roadmap, self.problem, output, depths, self.title)
-        how = output, depths, chart, fronts, free.arrivals
-        return draw_route(self.position, self.problem, route, *how, self.title)
+            road, problem, title = self._roadmap, self.problem, self.title
+            assert road is not None
+            if isinstance(
+                road, SlicedRoadmap
+            ):  # the slice nearest to the departure, over the current of its time
+                number = int(np.abs(road.departures - problem.departure).argmin())
+                problem = problem.leaving(float(road.departures[number]) - problem.departure)
+                which = f"slice {number + 1} of {road.departures.size}"
+                road, title = road.at(number), f"{title}, {which}" if title else which.capitalize()
+            return draw_roadmap(road, problem, output, depths, title)
+        problem = self._problem_of(route)
+        arrivals = self._leaving(problem.departure, Surfacing()).arrivals if fronts is not None else free.arrivals
+        return draw_route(self.position, problem, route, output, depths, chart, fronts, arrivals, self.title)
 
     def plot_routes(
         self,
@@ -364,7 +411,9 @@ class OpenedScenario:
         named = f"each path needs a different name; got {', '.join(map(str, paths))}; rename a file"
         require(len(routes) == len(paths), named)
         self.planner(Surfacing())  # this also compares the water with the roadmap's
-        return draw_routes(self.position, self.problem, routes, output, depth)
+        leave = {route.departure for route in routes.values()}
+        problem = self._problem_of(next(iter(routes.values()))) if len(leave) == 1 else self.problem
+        return draw_routes(self.position, problem, routes, output, depth)
 
 
 class OpenedRoadmap(OpenedScenario):
@@ -380,7 +429,7 @@ class OpenedRoadmap(OpenedScenario):
         True
     """
 
-    def __init__(self, roadmap: Roadmap, title: str = "") -> None:
+    def __init__(self, roadmap: Roadmap | SlicedRoadmap, title: str = "") -> None:
         """Keep a roadmap; `title` is the title of figures."""
         self.roadmap = roadmap
         self.title = title
@@ -391,7 +440,7 @@ class OpenedRoadmap(OpenedScenario):
         return scenario_of(self.roadmap)
 
     @property
-    def _roadmap(self) -> Roadmap | None:
+    def _roadmap(self) -> Roadmap | SlicedRoadmap | None:
         return self.roadmap
 
     @property
@@ -406,7 +455,10 @@ class OpenedRoadmap(OpenedScenario):
             >>> road.why_no_edges()
             ''
         """
-        return "" if self.roadmap.target.size else no_edges(self.roadmap, self.problem)
+        if self.roadmap.target.size:
+            return ""
+        one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
+        return no_edges(one, self.problem)
 
     def density(self) -> Density:
         """Return how far nodes lie apart in the vehicle's legs, and in how many directions legs leave them.
@@ -415,13 +467,16 @@ class OpenedRoadmap(OpenedScenario):
             >>> print(road.density())
             nodes 87 m apart at a depth, 0.41 legs; legs in 12 of 36 directions from a node
         """
-        return density_of(self.roadmap, float(polar(self.scenario.glider).best_angle.max()))
+        one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
+        return density_of(one, float(polar(self.scenario.glider).best_angle.max()))
 
     def __str__(self) -> str:
         return str(self.roadmap)
 
 
-def open(roadmap: str | File | Roadmap | OpenedRoadmap, overrides: Sequence[str] = ()) -> OpenedRoadmap:
+def open(
+    roadmap: str | File | Roadmap | SlicedRoadmap | OpenedRoadmap, overrides: Sequence[str] = ()
+) -> OpenedRoadmap:
     """Open a roadmap (a file or an object) for any number of queries.
 
     `overrides`, such as "flow.file=currents.nc", give the new place of a file that the scenario reads; a file
@@ -440,9 +495,9 @@ def open(roadmap: str | File | Roadmap | OpenedRoadmap, overrides: Sequence[str]
         return OpenedRoadmap(replace(before.roadmap, elsewhere=tuple(overrides)), before.title)
     if isinstance(roadmap, OpenedRoadmap):
         return roadmap
-    if isinstance(roadmap, Roadmap):
+    if isinstance(roadmap, Roadmap | SlicedRoadmap):
         return OpenedRoadmap(roadmap)
-    return OpenedRoadmap(read_roadmap(roadmap), File(roadmap).stem)
+    return OpenedRoadmap(read_any_roadmap(roadmap), File(roadmap).stem)
 
 
 def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()) -> OpenedScenario:
@@ -454,7 +509,7 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
 
 
 def open_either(
-    source: "str | File | Roadmap | Scenario | OpenedScenario", overrides: Sequence[str] = ()
+    source: "str | File | Roadmap | SlicedRoadmap | Scenario | OpenedScenario", overrides: Sequence[str] = ()
 ) -> OpenedScenario:
     """Open a roadmap or a scenario: an object, a file (a scenario's ends in .toml), or a shipped name.
 
@@ -467,6 +522,8 @@ def open_either(
         return source
     if isinstance(source, Scenario):
         return open_scenario(source, overrides)
-    if not isinstance(source, Roadmap) and (File(source).suffix == ".toml" or str(source) in shipped_scenarios()):
+    if isinstance(source, Roadmap | SlicedRoadmap):
+        return open(source, overrides)
+    if File(source).suffix == ".toml" or str(source) in shipped_scenarios():
         return open_scenario(source, overrides)
     return open(source, overrides)

@@ -18,13 +18,15 @@ from .pilot.lint import lint as lint_file
 from .pilot.score import Score
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
-from .roadmap.builder import Progress, build_roadmap, node_positions
+from .roadmap.builder import Progress, build_roadmap, build_slices, node_positions
 from .roadmap.compare import Difference, difference
 from .roadmap.density import Density
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
-from .roadmap.store import read_roadmap
+from .roadmap.slices import SlicedRoadmap
+from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario
+from .search.departures import Moment
 from .search.path import Path
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
     from .water.describe import Description, Place
     from .water.ocean import Names
 
-AnyRoadmap = str | File | Roadmap | OpenedRoadmap
+AnyRoadmap = str | File | Roadmap | SlicedRoadmap | OpenedRoadmap
 """A roadmap: the name of its file, an object, or an opened one, which keeps what queries need."""
 
 
@@ -54,9 +56,9 @@ def build(
     restart: bool = False,
     checkpoint: float | None = None,
     scheduler: str | None = None,
-    base: str | File | Roadmap | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
-) -> Roadmap:
+) -> Roadmap | SlicedRoadmap:
     """Build the roadmap of a scenario (a file, a shipped name or an object), and write it to `output`.
 
     A build into a file continues an earlier one that was stopped; `restart` begins again. Every `checkpoint` [s]
@@ -74,9 +76,11 @@ def build(
         file = {"restart": restart, "checkpoint": checkpoint, "scheduler": scheduler, "base": base}
         given = [name for name, value in file.items() if value not in (None, False)]
         require(not given, f"{', '.join(given)} need an output file; name one")
-        return build_roadmap(resolved.problem(), threads, progress)
+        problem = resolved.problem()
+        make = build_roadmap if len(problem.departures) == 1 else build_slices
+        return make(problem, threads, progress)
     _build(resolved, output, threads, progress, None, restart, checkpoint, scheduler, base)
-    return read_roadmap(output)
+    return read_any_roadmap(output)
 
 
 def build_part(
@@ -89,7 +93,7 @@ def build_part(
     restart: bool = False,
     checkpoint: float | None = None,
     scheduler: str | None = None,
-    base: str | File | Roadmap | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
     progress: Callable[[Progress], None] = lambda progress: None,
 ) -> None:
     """Build the part `shard`, such as "3/16", of a scenario's roadmap, for `merge`; see `build` for the rest.
@@ -113,7 +117,7 @@ def _build(
     restart: bool,
     checkpoint: float | None,
     address: str | None,
-    older: str | File | Roadmap | None,
+    older: str | File | Roadmap | SlicedRoadmap | None,
 ) -> None:
     job: dict[str, Any] = {"restart": restart, "shard": None if shard is None else shard_of(shard)}
     if checkpoint is not None:
@@ -148,7 +152,7 @@ def _resolved(scenario: str | File | Scenario, output: str | File | None, overri
     return read_scenario(scenario, overrides)
 
 
-def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
+def merge(parts: Sequence[str | File], output: str | File) -> Roadmap | SlicedRoadmap:
     """Merge the parts that `build_part` wrote into one roadmap.
 
     Examples:
@@ -159,10 +163,10 @@ def merge(parts: Sequence[str | File], output: str | File) -> Roadmap:
         True
     """
     merge_parts(parts, output)
-    return read_roadmap(output)
+    return read_any_roadmap(output)
 
 
-def info(roadmap: AnyRoadmap) -> Roadmap:
+def info(roadmap: AnyRoadmap) -> Roadmap | SlicedRoadmap:
     """Return a roadmap from its file; `print` shows it.
 
     Examples:
@@ -198,6 +202,7 @@ def query(
     polish: bool = False,
     within: float | None = None,
     seconds: float | None = None,
+    depart: Moment | None = None,
 ) -> Path:
     """Return the cheapest path between two points; see `OpenedRoadmap.query`.
 
@@ -212,6 +217,7 @@ def query(
     return open_roadmap(roadmap).query(
         start,
         goal,
+        depart=depart,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
@@ -239,6 +245,7 @@ def plan(
     polish: bool = False,
     within: float | None = None,
     seconds: float | None = None,
+    depart: Moment | None = None,
 ) -> Path:
     """Return the cheapest path of a scenario, without a roadmap; see `OpenedRoadmap.query`.
 
@@ -251,6 +258,7 @@ def plan(
     return open_scenario(scenario, overrides).query(
         start,
         goal,
+        depart=depart,
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,

@@ -1,5 +1,6 @@
 """Scenarios: makes objects from TOML, checks every key, and builds the problem."""
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -23,6 +24,7 @@ from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
+from .roadmap.slices import SlicedRoadmap
 from .roadmap.steering import METHODS, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
@@ -47,11 +49,13 @@ SECTIONS = (
     "integration",
     "cost",
     "query",
+    "departures",
 )
-OPTIONAL = ("terrain", "query")
+OPTIONAL = ("terrain", "query", "departures")
 
 
 COSTS: dict[str, type[Cost]] = {"time": TravelTime, "energy": Energy}
+MOST_SLICES = 10_000
 FILES = {key for keys in KEYS.values() for key in keys}
 """The keys whose values are names of files."""
 KINDS: dict[str, tuple[str, Mapping[str, type[Any]]]] = {
@@ -90,6 +94,37 @@ class QueryPoints:
 
 
 @dataclass(frozen=True)
+class Departures:
+    """The departures of a roadmap's slices [s]: the `first`, one `every` so many seconds after it, the `last`."""
+
+    first: float
+    last: float
+    every: float
+
+    def __post_init__(self) -> None:
+        for name in ("first", "last"):
+            value = getattr(self, name)
+            fits = abs(value) <= LONGEST
+            require(fits, f"`departures.{name}` must be within {LONGEST:g} s of 0; got {value:g}")
+        rises = self.first <= self.last
+        require(rises, f"`departures.last` must not be before `first`, {self.first:g} s; got {self.last:g}")
+        require(self.every > 0, f"`departures.every` must be above 0 s; got {self.every:g}")
+        count = (self.last - self.first) / self.every + 1
+        least = (self.last - self.first) / (MOST_SLICES - 1)
+        require(
+            count <= MOST_SLICES,
+            f"`departures.every` = {self.every:g} s makes {count:,.0f} departures, more than {MOST_SLICES:,}; "
+            f"make it at least {least:.6g}",
+        )
+
+    def times(self) -> tuple[float, ...]:
+        """All of them, rising."""
+        steps = math.floor((self.last - self.first) / self.every * (1 + 1e-12))
+        times = [min(self.first + n * self.every, self.last) for n in range(steps + 1)]
+        return tuple(times) if times[-1] == self.last else (*times, self.last)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """A problem as the TOML file describes it: one object for each section; `text` is the complete TOML.
 
@@ -110,6 +145,7 @@ class Scenario:
     cost: Cost
     query: QueryPoints | None
     text: str
+    departures: Departures | None = None
 
     def problem(self) -> Problem:
         """Return the problem: flow, terrain, glide polar, and all else that a search needs."""
@@ -126,7 +162,7 @@ class Scenario:
         ratio = divergence_ratio(flow, (lo[0], hi[0]), (lo[1], hi[1]), (lo[2], hi[2]), self.departure)
         text += f", at most {known.max_speed:.2f} m/s, divergence {ratio:.2g} of vorticity"
         if not is_steady(flow):
-            text += f"; it changes with time, and legs hold for departure at {self.departure:g} s"
+            text += f"; it changes with time, and legs hold for {self._when()}"
         sampler = self.sampler
         if isinstance(sampler, YoSampler):
             sampler = sampler.for_glide(float(table.best_angle.max()))
@@ -150,12 +186,35 @@ class Scenario:
             frozen=self.query is not None and self.query.frozen,
             bins=None if self.query is None else self.query.bins,
             domain=self.domain,
+            slices=self._slices(flow),
         )
 
     @property
     def departure(self) -> float:
         """The time when gliders leave their nodes [s]."""
         return 0.0 if self.query is None else self.query.departure
+
+    def _when(self) -> str:
+        several = self.departures is not None and self.departures.first < self.departures.last
+        return "the departures of their slices" if several else f"departure at {self.departure:g} s"
+
+    def _slices(self, flow: Flow) -> tuple[float, ...]:
+        """The departures of the roadmap's slices [s]; none where the scenario has no [departures]."""
+        if self.departures is None:
+            return ()
+        first, last, known = self.departures.first, self.departures.last, flow.extent
+        why = "[departures] makes slices of a flow that changes, and this one does not; remove that section"
+        require(not is_steady(flow), why)
+        span = f"the times of the flow, {known.t_lo:g} to {known.t_hi:g} s"
+        for name, value in (("first", first), ("last", last)):
+            within = known.t_lo <= value <= known.t_hi
+            require(within, f"`departures.{name}` = {value:g} s lies outside {span}; choose one of them")
+        require(
+            first <= self.departure <= last,
+            f"`query.departure` = {self.departure:g} s lies outside [departures], {first:g} to {last:g} s; "
+            "choose a time between",
+        )
+        return self.departures.times()
 
     def _departs(self) -> datetime | None:
         """The date when gliders leave (UTC), or None if the flow has no date."""
@@ -210,15 +269,18 @@ class Scenario:
             "[terrain] needs a domain in `lon`, `lat` and `depth`, except for `max_depth`; got x, y, z",
         )
         assert isinstance(self.domain, GeographicDomain)
-        domain, frame, asked = self.domain, self.domain.frame(), self.terrain
-        if asked.bathymetry is not None:
+        domain, frame, settings = self.domain, self.domain.frame(), self.terrain
+        if settings.bathymetry is not None:
             from .water.ocean.bathymetry import read_bathymetry
 
             lo, hi = domain.box()
             stray = float(max((lo[:2] - box[0]).max(), (box[1] - hi[:2]).max()))
-            text = asked.variable, asked.positive, asked.names
-            bottoms = [*bottoms, read_bathymetry(asked.bathymetry, frame, domain.lon, domain.lat, stray, *text)]
-        return raster_terrain(asked, frame, *box, bottoms, domain.box())
+            text = settings.variable, settings.positive, settings.names
+            bottoms = [
+                *bottoms,
+                read_bathymetry(settings.bathymetry, frame, domain.lon, domain.lat, stray, *text),
+            ]
+        return raster_terrain(settings, frame, *box, bottoms, domain.box())
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -256,7 +318,7 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         # some editors write a byte order mark at the start
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise InputError(f"the scenario {name} cannot be read: {error.strerror}") from None
+        raise InputError(f"the scenario {name} cannot be read: {error.strerror}; name another") from None
     except UnicodeDecodeError as error:
         raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as UTF-8") from None
     except (ValueError, RecursionError) as error:
@@ -277,7 +339,7 @@ def scenario_from_text(text: str) -> Scenario:
         raise InputError(f"the roadmap's scenario is not valid TOML: {error}") from None
 
 
-def scenario_of(road: Roadmap) -> Scenario:
+def scenario_of(road: Roadmap | SlicedRoadmap) -> Scenario:
     """Return the scenario that a roadmap holds; its files are found again if they or the roadmap have moved."""
     text = road.provenance.scenario
     try:
@@ -326,6 +388,7 @@ def scenario_from_table(table: Mapping[str, Any], folder: Path) -> Scenario:
         cost=blocks["cost"],
         query=from_table(QueryPoints, table["query"], "query") if "query" in table else None,
         text=to_toml(table),
+        departures=from_table(Departures, table["departures"], "departures") if "departures" in table else None,
     )
 
 

@@ -22,7 +22,7 @@ AIM_DIRECTION, AIM_ANGLE, AIM_HEADING, AIM_TIME, AIM_MISS, AIM_STATE = _ROWS[:6]
 """Rows of a lane beyond `flight`'s: its control [rad], its time [s] and miss [m], its state."""
 AIM_INVERSE = _ROWS[6]
 """The first of four rows: d(angle, heading) / d(x, y) of the flow map near the guess, row by row."""
-_OFF_X, _OFF_Y, _TURN_A, _TURN_H, _FIRST_MISS, _ITERATION = _ROWS[10:]
+AIM_OFF_X, AIM_OFF_Y, AIM_TURN_A, AIM_TURN_H, _FIRST_MISS, _ITERATION = _ROWS[10:]
 AIM_ROWS = _ROWS.stop
 OPEN, HIT, LOST = 1.0, 2.0, 3.0
 """States: closing in; landed on the target; it leads nowhere."""
@@ -37,7 +37,7 @@ def aim(polar, lanes, n, direction, pair, angle, heading, dt):
     keep_ends(lanes, n, pair)
     lanes[AIM_DIRECTION, n], lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n] = direction, angle, heading
     lanes[AIM_STATE, n], lanes[_ITERATION, n] = OPEN, 0.0
-    _take_off(polar, lanes, n, FIRST_STEP * dt)
+    take_off(polar, lanes, n, FIRST_STEP * dt)
 
 
 @inlined
@@ -47,7 +47,7 @@ def control_in(polar, lanes, n):
 
 
 @kernel
-def _take_off(polar, lanes, n, dt):
+def take_off(polar, lanes, n, dt):
     """Lane n's control, flown from its start to its goal's depth; steps as `motion.trace` takes them."""
     c = control_in(polar, lanes, n)
     start, goal = ends_of(lanes, n)
@@ -73,16 +73,16 @@ def correct(polar, integration, lanes, n):
     if iteration == 0.0:
         lanes[_FIRST_MISS, n] = miss
     else:
-        _broyden(lanes, n, off_x - lanes[_OFF_X, n], off_y - lanes[_OFF_Y, n])
-    lanes[_OFF_X, n], lanes[_OFF_Y, n] = off_x, off_y
+        broyden(lanes, n, off_x - lanes[AIM_OFF_X, n], off_y - lanes[AIM_OFF_Y, n])
+    lanes[AIM_OFF_X, n], lanes[AIM_OFF_Y, n] = off_x, off_y
     turn_a = -(lanes[AIM_INVERSE, n] * off_x + lanes[AIM_INVERSE + 1, n] * off_y)
     turn_h = -(lanes[AIM_INVERSE + 2, n] * off_x + lanes[AIM_INVERSE + 3, n] * off_y)
     shorten = min(1.0, MAX_TURN / max(abs(turn_a), abs(turn_h), MAX_TURN))
     low, high = polar.shallowest[direction], polar.steepest[direction]
     angle = min(max(lanes[AIM_ANGLE, n] + shorten * turn_a, low), high)
-    lanes[_TURN_A, n], lanes[_TURN_H, n] = angle - lanes[AIM_ANGLE, n], shorten * turn_h
+    lanes[AIM_TURN_A, n], lanes[AIM_TURN_H, n] = angle - lanes[AIM_ANGLE, n], shorten * turn_h
     # a second step beyond the glide polar's end, or none at all
-    stuck = iteration > 0.0 and lanes[_TURN_A, n] == 0.0 and (turn_a != 0.0 or turn_h == 0.0)
+    stuck = iteration > 0.0 and lanes[AIM_TURN_A, n] == 0.0 and (turn_a != 0.0 or turn_h == 0.0)
     astray = iteration == GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
     if stuck or astray or iteration == MAX_ITERATIONS - 1 or not miss < math.inf:
         lanes[AIM_STATE, n] = LOST
@@ -91,13 +91,13 @@ def correct(polar, integration, lanes, n):
     lanes[AIM_ANGLE, n] = angle
     lanes[AIM_HEADING, n] += shorten * turn_h
     lanes[_ITERATION, n] += 1.0
-    _take_off(polar, lanes, n, integration.dt)
+    take_off(polar, lanes, n, integration.dt)
 
 
 @inlined
-def _broyden(lanes, n, dx, dy):
+def broyden(lanes, n, dx, dy):
     """Broyden's update of the inverse Jacobian (Sherman-Morrison): it now maps (dx, dy) to the last turn."""
-    da, dh = lanes[_TURN_A, n], lanes[_TURN_H, n]
+    da, dh = lanes[AIM_TURN_A, n], lanes[AIM_TURN_H, n]
     ja = lanes[AIM_INVERSE, n] * dx + lanes[AIM_INVERSE + 1, n] * dy
     jh = lanes[AIM_INVERSE + 2, n] * dx + lanes[AIM_INVERSE + 3, n] * dy
     # row vector s^T J^-1

@@ -58,7 +58,7 @@ def road(place):
     ],
 )
 @pytest.mark.skipif(os.name == "nt", reason="no named pipes")
-def test_a_pipe_is_no_input(road, capsys, line):
+def test_a_pipe_is_refused_as_input(road, capsys, line):
     for name in line.split():
         if name.startswith("pipe"):
             os.mkfifo(name)

@@ -114,7 +114,7 @@ def test_the_version(capsys):
     assert version("glider-stream") in command(capsys, "--version").out
 
 
-def test_stopping_is_no_traceback(capsys, monkeypatch, file):
+def test_stopping_shows_no_traceback(capsys, monkeypatch, file):
     def stop(*arguments):
         raise KeyboardInterrupt
 

@@ -87,7 +87,7 @@ def test_rooms_import_only_from_lower_floors():
             assert lower, f"{name} imports {other}, which is not on a lower floor"
 
 
-def test_there_is_no_circle():
+def test_imports_have_no_circle():
     graphlib.TopologicalSorter(IMPORTS).prepare()
 
 

@@ -201,7 +201,7 @@ def test_files_are_relative_to_the_scenario_and_overrides_to_the_working_directo
     assert scenario_from_text(scenario.text).flow.file == (str(home / "a.nc"),)
 
 
-def test_a_number_is_no_file(tmp_path):
+def test_a_number_is_not_a_file_name(tmp_path):
     with pytest.raises(InputError, match=r"`flow.file` must be a text; got 3"):
         read_scenario(ocean_file(tmp_path), ["flow.file=[3]"])
 

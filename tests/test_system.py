@@ -49,7 +49,7 @@ def test_as_a_module_and_as_a_command():
 
 
 @pytest.mark.parametrize("where", ["2>/dev/full", "2> >(exit)", "<&- 1>&- 2>&-"])
-def test_nobody_hears_the_progress(place, where):
+def test_progress_with_standard_error_closed(place, where):
     if "/dev/full" in where and not Path("/dev/full").exists():
         pytest.skip("no /dev/full here")
     done = shell(f"sleep 0.1; $G build small.toml -o road.h5 {where}")
@@ -59,11 +59,11 @@ def test_nobody_hears_the_progress(place, where):
 
 
 @pytest.mark.parametrize("where", ["2>&-", "2>/dev/full"])
-def test_a_refusal_that_nobody_hears_is_one(place, where):
+def test_a_refusal_with_standard_error_closed_keeps_its_exit_code(place, where):
     assert shell(f"$G build nowhere.toml -o road.h5 {where}").returncode == 2
 
 
-def test_a_reader_that_has_seen_enough(built):
+def test_a_reader_that_closes_standard_output(built):
     done = shell("$G info road.h5 | true; echo ${PIPESTATUS[0]}")
     assert done.stdout.strip() in ("0", "141")
     assert done.stderr == ""
@@ -119,7 +119,7 @@ def test_names_that_are_not_utf_8(built, capsys):
         assert (said.code, said.err.count("\n"), "\\udcff" in said.err) == (2, 1, True), said
 
 
-def test_an_output_that_knows_few_letters(built):
+def test_an_output_with_a_small_alphabet(built):
     said = shell("$G info $'no\u2192\u03b3.h5'", env={"PYTHONIOENCODING": "cp1252", "LC_ALL": "C.UTF-8"})
     assert (said.returncode, "Traceback" in said.stderr) == (2, False)
     assert "no\\u2192\\u03b3.h5" in said.stderr

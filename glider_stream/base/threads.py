@@ -29,13 +29,18 @@ def threads(count: int | None) -> Iterator[int]:
         _COUNT.reset(before)
 
 
+def thread_count() -> int:
+    """How many threads kernels run on here."""
+    return _COUNT.get() or usable_cores()
+
+
 def in_parallel(kernel: Callable[[int, int], object], count: int, at_once: int) -> None:
     """Call `kernel(first, last)` until items 0 to count - 1 are done, `at_once` items in a call.
 
     The kernel writes only to the rows of its items, so results depend neither on threads nor on `at_once`.
     """
     spans = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
-    workers = min(_COUNT.get() or usable_cores(), len(spans))
+    workers = min(thread_count(), len(spans))
     if workers <= 1:
         for span in spans:
             kernel(*span)

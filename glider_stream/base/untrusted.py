@@ -2,8 +2,9 @@
 
 import math
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import h5py
 
@@ -44,36 +45,36 @@ def check_links(path: str | Path) -> None:
 
     OSError or RuntimeError, from h5py, if it is damaged.
     """
-    seen: set[object] = set()
     with h5py.File(path, "r") as file:
-        waiting: list[h5py.Group] = [file]
-        while waiting:
-            group = waiting.pop()
-            for name in group:
-                link = group.get(name, getlink=True)
-                within = not isinstance(link, h5py.ExternalLink)
-                require(
-                    within,
-                    f"{path} links to another file at `{name}`, but links are not followed: copy the data into "
-                    "it",
-                )
-                if isinstance(link, h5py.SoftLink):
-                    continue
-                item = group.get(name)
-                if item is None or item.id in seen:
-                    continue
-                seen.add(item.id)
-                require(len(seen) <= MOST_OBJECTS, f"{path} holds more than {MOST_OBJECTS:,} objects; cut it")
-                if isinstance(item, h5py.Group):
-                    waiting.append(item)
-                elif isinstance(item, h5py.Dataset):
-                    inside = not item.external and not item.is_virtual
-                    require(
-                        inside,
-                        f"the data of `{name}` in {path} lie in other files, which are not read: copy them into "
-                        "it",
-                    )
-                    _check_storage(path, str(item.name).lstrip("/"), item)
+        for name, item in _objects(path, file):
+            if isinstance(item, h5py.Dataset):
+                inside = not item.external and not item.is_virtual
+                cure = "lie in other files, which are not read: copy them into it"
+                require(inside, f"the data of `{name}` in {path} {cure}")
+                _check_storage(path, str(item.name).lstrip("/"), item)
+
+
+def _objects(path: str | Path, file: h5py.File) -> Iterator[tuple[str, Any]]:
+    """Yield each group and dataset of a file once, with its name; InputError at a link to another file."""
+    seen: set[object] = set()
+    waiting: list[h5py.Group] = [file]
+    while waiting:
+        group = waiting.pop()
+        for name in group:
+            link = group.get(name, getlink=True)
+            cure = "but links are not followed: copy the data into it"
+            within = not isinstance(link, h5py.ExternalLink)
+            require(within, f"{path} links to another file at `{name}`, {cure}")
+            if isinstance(link, h5py.SoftLink):
+                continue
+            item = group.get(name)
+            if item is None or item.id in seen:
+                continue
+            seen.add(item.id)
+            require(len(seen) <= MOST_OBJECTS, f"{path} holds more than {MOST_OBJECTS:,} objects; cut it")
+            if isinstance(item, h5py.Group):
+                waiting.append(item)
+            yield name, item
 
 
 def _check_storage(path: str | Path, name: str, dataset: h5py.Dataset) -> None:

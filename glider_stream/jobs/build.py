@@ -1,6 +1,7 @@
 """Jobs: builds that survive a kill; in parts, on a cluster, or with the edges of an older roadmap."""
 
 import heapq
+import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import lonlat_of, provenance_of
 from ..roadmap.roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, by_node, in_order
 from ..roadmap.shard import Shard
+from ..roadmap.slices import SlicedRoadmap, rows_of
 from ..roadmap.step_error import StepSample
 from ..roadmap.store import read_part, writing
 from .journal import Journal
@@ -49,7 +51,7 @@ class Job:
     restart: bool = False
     checkpoint: float = CHECKPOINT
     shard: Shard | None = None
-    base: tuple[Roadmap, NDArray[np.bool_]] | None = None
+    base: tuple[Roadmap | SlicedRoadmap, NDArray[np.bool_]] | None = None
     finder: Finder = find_edges
     warm: bool = True
 
@@ -79,22 +81,23 @@ def build_file(
         made = provenance_of(problem, position, target.parent)
         shard = job.shard or Shard(1, 1)
         nodes = np.arange(*shard.nodes(len(position)))
-        old = _taken_over(job, nodes)
+        slices = len(problem.departures)
+        rows = rows_of(nodes, slices)
+        old = _taken_over(job, rows, slices)
         # records do not hold the edges of the base, so they fit only a build with the same base
         identity = {**made.identity(), "shard": str(shard), "nodes": len(position), "base": old.digest()}
         journal_path = target.with_name(f"{target.name}.journal")
         kept = ""
         try:
             with (
-                Journal(journal_path, identity, nodes, job.restart, job.checkpoint) as journal,
+                Journal(journal_path, identity, rows, job.restart, job.checkpoint) as journal,
                 threads(thread_count) as used,
             ):
                 try:
                     _run(problem, position, made, path, journal, shard, old, job, used, progress, batch_pairs)
                 finally:
-                    kept = (
-                        f"{int(journal.done.sum()):,} of {len(position):,} nodes are kept in {journal_path.name}"
-                    )
+                    done = int(journal.done.sum()) // slices
+                    kept = f"{done:,} of {len(position):,} nodes are kept in {journal_path.name}"
         except KeyboardInterrupt:
             raise Stopped(f"stopped; {kept}: give the same command again to continue") from None
         except Unwritable as error:
@@ -120,27 +123,27 @@ def _run(
     progress: Callable[[Progress], None],
     batch_pairs: int,
 ) -> None:
+    slices = len(problem.departures)
     nodes = np.arange(*shard.nodes(len(position)))
-    tally, sample = Tally(len(nodes), used), StepSample(len(position))
-    if old.source.size:
-        tally.add(old)
-        sample.take(old)
-    for edges in journal.records():
+    tally, sample = Tally(len(nodes) * slices, used), StepSample(len(position))
+    for edges in itertools.chain([old] if old.source.size else [], journal.records()):
         tally.add(edges)
-        sample.take(edges)
-    made = sample.checked(made, problem, position, lambda some: job.finder(problem, position, some, batch_pairs))
+        if slices == 1:
+            sample.take(edges)
+    made = sample.checked(made, problem, position, lambda one, some: job.finder(one, position, some, batch_pairs))
     known = journal.done.copy()
     twice = known[old.source].any()
     require(not twice, f"{journal.path} holds nodes that --from already covers; start again with --restart")
     known[old.source] = True
-    waiting = nodes[~known[nodes]]
+    waiting = nodes[~known[nodes * slices]]  # a node's departures are found together
     if waiting.size:
         if job.warm:
             warm_up(problem)
         for edges in job.finder(problem, position, waiting, batch_pairs):
             journal.append(edges)
             progress(tally.add(edges))
-    with writing(path, position, lonlat_of(problem, position), made, shard) as file:
+    departures = np.array(problem.departures) if slices > 1 else None
+    with writing(path, position, lonlat_of(problem, position), made, shard, departures) as file:
         for edges in by_node(heapq.merge([old], journal.records(), key=_first)):
             file.append(edges)
         file.finish(tally)
@@ -152,16 +155,18 @@ def _first(edges: Edges) -> int:
     return int(edges.source[0]) if edges.source.size else -1
 
 
-def _taken_over(job: Job, nodes: Index) -> Edges:
-    """Return the edges of these nodes that an older roadmap has right."""
+def _taken_over(job: Job, rows: Index, slices: int) -> Edges:
+    """Return, of these rows of edges, those of the nodes that an older roadmap has right."""
     if job.base is None:
         return in_order([])
-    road, right = job.base
-    assert road.node_counts is not None
+    road, nodes = job.base
+    counts = road.row_counts if isinstance(road, SlicedRoadmap) else road.node_counts
+    assert counts is not None
     values = np.stack([getattr(road, name) for name in EDGE_FIELDS], axis=1)
-    every = Edges(np.arange(len(right)), np.diff(road.indptr), road.target, values, road.node_counts)
+    right = np.repeat(nodes, slices)
+    every = Edges(np.arange(len(right)), np.diff(road.indptr), road.target, values, counts)
     mine = np.zeros(len(right), dtype=bool)
-    mine[nodes] = True
+    mine[rows] = True
     return every.of(right & mine)
 
 
@@ -203,8 +208,10 @@ def merge(parts: Sequence[str | Path], output: str | Path) -> None:
     )
     with locked(target.resolve()):
         remove_abandoned(target.resolve())
-        tally = Tally(len(first.position), max(part.threads for _, part in heads))
-        with writing(target, first.position, first.lonlat, first.provenance, Shard(1, 1)) as file:
+        slices = 1 if first.departures is None else first.departures.size
+        tally = Tally(len(first.position) * slices, max(part.threads for _, part in heads))
+        what = first.position, first.lonlat, first.provenance, Shard(1, 1), first.departures
+        with writing(target, *what) as file:
             for _, path in sorted(seen.items()):
                 part = read_part(path)
                 assert part.edges is not None

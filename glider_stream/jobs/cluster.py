@@ -21,7 +21,7 @@ from ..base.errors import InputError
 from ..base.settings import require
 from ..base.threads import threads
 from ..kernels.cache import KERNEL_DIGEST
-from ..roadmap.builder import find_edges, warm_up
+from ..roadmap.builder import find_edges, nodes_of_batch, warm_up
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Edges
 
@@ -140,7 +140,7 @@ class Cluster:
         # degrees are computed here, so that the frame need not be sent
         work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
         sent = self.client.scatter(work, broadcast=True, hash=False)
-        size = max(1, batch_pairs // problem.legs(position).pairs_per_node)
+        size = nodes_of_batch(problem, problem.legs(position), batch_pairs)
         chunks = iter(np.array_split(source, range(size, len(source), size)))
         waiting = _distributed().as_completed()
         counted, room = -math.inf, 0

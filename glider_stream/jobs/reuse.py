@@ -11,12 +11,14 @@ from scipy.sparse.csgraph import dijkstra
 from ..base.arrays import Array, Bools
 from ..base.settings import require
 from ..kernels.flow import Flow, Grid, OceanGrid, fields_of
+from ..kernels.reach import LATEST
 from ..kernels.terrain import Seabed
 from ..roadmap.builder import node_positions
 from ..roadmap.pairs import NeighbourLegs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import provenance_of
 from ..roadmap.roadmap import Roadmap
+from ..roadmap.slices import SlicedRoadmap
 
 SIDE = 480
 """Times are bounded on a lattice with this many cells along its longer side."""
@@ -28,7 +30,7 @@ VALUES = {"values", "max_speed", "level_speed", "level_carry", "bottom", "ground
 """The fields that may differ between two flows, or seabeds, on one grid."""
 
 
-def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
+def untouched(old: Roadmap | SlicedRoadmap, before: Problem, now: Problem) -> Bools:
     """Return which nodes (n,) keep all edges and pairs of the roadmap `old`, although the flow has changed.
 
     No path from such a node meets the changed water within the horizon, not even if the fastest current of each
@@ -43,15 +45,16 @@ def untouched(old: Roadmap, before: Problem, now: Problem) -> Bools:
         "steering": (before.evaluator.steering, now.evaluator.steering),
         "integration": (before.evaluator.integration, now.evaluator.integration),
         "neighbours": (before.law, now.law),
-        "departure": (before.departure, now.departure),
+        "departure": (before.departures, now.departures),
     }
     unlike = [name for name, (made_with, asked) in what.items() if made_with != asked]
     require(
         not unlike,
         f"the older roadmap differs in {', '.join(unlike)}, not only in the flow; build without --from",
     )
+    counts = old.row_counts if isinstance(old, SlicedRoadmap) else old.node_counts
     require(
-        old.node_counts is not None,
+        counts is not None,
         "the older roadmap does not hold the pair counts of each node; build without --from",
     )
     lattice = _Lattice(before, now, position)
@@ -74,7 +77,9 @@ class _Lattice:
         self.before, self.now, self.position = before, now, position
         self._known: dict[int, tuple[Any, Any]] = {}
         integration = now.evaluator.integration
-        self.horizon = integration.dt * integration.steps
+        # legs that are followed are flown to this much later, before they are known to be too late
+        later = LATEST if len(now.departures) > 1 else 1.0
+        self.horizon = later * integration.dt * integration.steps
         self.glide = float(now.evaluator.polar.best_horizontal.max())
         self.flows: tuple[Flow, Flow] = before.evaluator.flow, now.evaluator.flow
         self.fastest = max(flow.extent.max_speed for flow in self.flows)
@@ -109,12 +114,12 @@ class _Lattice:
         return found
 
     def _in_time(self, flow: Grid | OceanGrid, values: Any) -> Any:
-        """Return the values, by time first, that are read between departure and horizon."""
+        """Return the values, by time first, that are read between the first departure and the last horizon."""
         if isinstance(flow, Grid):
             return values
-        start = self.now.departure
+        start, last = self.now.departures[0], self.now.departures[-1]
         first = max(int(np.searchsorted(flow.times, start, side="right")) - 1, 0)
-        return values[first : int(np.searchsorted(flow.times, start + self.horizon)) + 1]
+        return values[first : int(np.searchsorted(flow.times, last + self.horizon)) + 1]
 
     def _touched(self, grid: Grid | OceanGrid | Seabed, points: Bools) -> Bools:
         """Return the cells that read one of the grid's `points` (ni, nj)."""

@@ -119,7 +119,7 @@ def refuse_unknown(header: str, values: Iterable[Any], what: str) -> None:
     )
 
 
-def told_height(values: Mapping[str, Any], what: str) -> float | None:
+def stated_height(values: Mapping[str, Any], what: str) -> float | None:
     """Return the height [m, upward] in the properties of a point, or None if they hold none."""
     found: dict[str, float] = {}
     for name, value in values.items():

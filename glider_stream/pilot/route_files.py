@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Xml
 
 from ..base.errors import InputError
 from ..base.settings import require
-from .route_columns import HEIGHTS, NotARoute, column_of, csv_points, depth_of, refuse_unknown, told_height
+from .route_columns import HEIGHTS, NotARoute, column_of, csv_points, depth_of, refuse_unknown, stated_height
 from .route_maps import OURS, Mark, gpx_points, kml_points, route_of
 from .seaglider import target_points
 from .slocum_files import goto_points
@@ -144,7 +144,7 @@ def _check_line(properties: dict[str, Any]) -> None:
 
 def _below(place: Any, properties: dict[str, Any]) -> tuple[Any, Any, float]:
     """Return lon, lat, depth of a point with an altitude; its properties may also give the depth."""
-    height = told_height(properties, "property")
+    height = stated_height(properties, "property")
     return place[0], place[1], depth_of(place[2] if len(place) > 2 else None, height)
 
 

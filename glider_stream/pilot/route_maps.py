@@ -4,7 +4,7 @@ import re
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
-from .route_columns import NotARoute, depth_of, told_height
+from .route_columns import NotARoute, depth_of, stated_height
 
 Place = tuple[Any, Any, Any]
 CONTAINERS = ("kml", "Document", "Folder")
@@ -152,7 +152,7 @@ def _name(shape: _Shape) -> str:
 
 def _marked(shape: _Shape, notes: list[str]) -> list[Mark]:
     """Return the points of an element."""
-    height = None if shape.placemark is None else told_height(_data(shape.placemark), "data")
+    height = None if shape.placemark is None else stated_height(_data(shape.placemark), "data")
     places = _coordinates(shape, notes)
     return [Mark(_name(shape), (a, b, depth_of(0.0 - depth, height))) for a, b, depth in places]
 
@@ -174,7 +174,7 @@ def _coordinates(shape: _Shape, notes: list[str]) -> list[Place]:
         texts = " ".join(child.text or "" for child in _named(element, "coordinates"))
         values = [[float(value) for value in place.split(",")] for place in texts.split()]
     if _kind(element) in LINES and shape.placemark is not None:
-        height = told_height(_data(shape.placemark), "data")
+        height = stated_height(_data(shape.placemark), "data")
         if height is not None:
             raise NotARoute("its line has data with one depth; write the depth as the altitude of each point")
     heights = [value[2] if len(value) > 2 else 0.0 for value in values]
@@ -237,7 +237,7 @@ def _gpx_marks(tree: Xml.Element, kind: str) -> list[Mark]:
         values = {_kind(inner): (inner.text or "").strip() for inner in leaves}
         height = values.pop("ele", "")
         name = values.pop("name", "")
-        stated = told_height(values, "point's element")
+        stated = stated_height(values, "point's element")
         depth = depth_of(float(height) if height else None, stated)
         marks.append(Mark(name, (float(point.attrib["lon"]), float(point.attrib["lat"]), depth)))
     return marks

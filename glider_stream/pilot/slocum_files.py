@@ -267,7 +267,7 @@ def goto_points(text: str) -> tuple[list[tuple[float, float, float]], list[str]]
     if values.get("num_waypoints") != len(file.rows):
         faults.append(f"num_waypoints is not {len(file.rows)}, the number of its rows")
     if faults:
-        raise NotARoute(f"{faults[0]}; `glider-stream lint` says all that is wrong with it")
+        raise NotARoute(f"{faults[0]}; `glider-stream lint` shows all its faults")
     places = [tuple(from_degrees_and_minutes(part) for part in row.split()) for _, row in file.rows]
     first, notes = int(values.get("initial_wpt", -2)), list[str]()
     if first < 0 and len(places) > 1:

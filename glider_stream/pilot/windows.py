@@ -64,12 +64,12 @@ def windows(path: Path, hours: float = HOURS) -> Iterator[Window]:
         require(len(tracks) == len(path.legs), "the route does not hold its longitudes; query it again")
         at = np.concatenate(tracks)
         at = np.column_stack([wrapped(at[:, 0], float(at[0, 0])), at[:, 1]])
-    asked = rows[-1, 0] / (3600 * hours)
+    needed = rows[-1, 0] / (3600 * hours)
     require(
-        asked <= MOST_WINDOWS,
+        needed <= MOST_WINDOWS,
         f"windows of {hours:g} h are more than {MOST_WINDOWS:,} on this route; choose longer windows",
     )
-    count = max(1, math.ceil(asked - 1e-9))
+    count = max(1, math.ceil(needed - 1e-9))
     for n in range(count):
         start, end = 3600 * hours * n, min(3600 * hours * (n + 1), float(rows[-1, 0]))
         inside = (rows[:, 0] >= start) & (rows[:, 0] <= end)

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,21 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
+from ..base.threads import thread_count as threads_now
 from ..base.threads import threads
 from ..kernels.edges import STATUS, TIME, Status
-from .pairs import Legs
+from .evaluator import NODES_AT_ONCE
+from .follow import Follower
+from .pairs import Found, Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
+from .slices import SlicedRoadmap, rows_of
 from .step_error import StepSample
 
 BATCH_PAIRS = 100_000
+SPANS = 2
+"""Shares of a batch for each thread, so that none waits long for the slowest."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,12 @@ def node_positions(problem: Problem) -> Array:
 
 def warm_up(problem: Problem) -> None:
     """Compile the kernels that a build needs, or load them from the disk cache."""
-    problem.legs(problem.lo[None]).of(np.zeros(1, np.int64))
+    nobody = np.zeros(1, np.int64)
+    problem.legs(problem.lo[None]).of(nobody)
+    if len(problem.departures) > 1:
+        follower = replace(Follower.of(problem, problem.lo[None]), few=0)
+        for _ in replace(follower, problem=replace(problem, slices=problem.departures[:2])).slices(nobody):
+            pass
 
 
 def find_edges(
@@ -68,23 +79,47 @@ def find_edges(
 ) -> Iterator[Edges]:
     """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
 
-    Each node is left at its `departure` (n,) [s], all at the problem's if None; `wanted` says of some sources to
-    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the
-    batches change a bit of the result.
+    Each node is left at its `departure` (n,) [s], at the problem's if None; `wanted` says of some sources to
+    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the batches
+    change a bit of the result. The edges leave rows, as `slices.rows_of` numbers them: with one departure the
+    nodes.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     legs = problem.legs(position)
     source = np.arange(len(position)) if source is None else source
-    size = max(1, batch_pairs // legs.pairs_per_node)
+    size = nodes_of_batch(problem, legs, batch_pairs)
+    follower = Follower.of(problem, position) if len(problem.departures) > 1 else None
     for first in range(0, len(source), size):
         some = source[first : first + size]
+        if follower is not None:
+            yield _followed(follower, some)
+            continue
         when = None if departure is None else departure[some]
         yield _evaluated(legs, some, when, None if wanted is None else wanted(some))
+
+
+def nodes_of_batch(problem: Problem, legs: Legs, batch_pairs: int) -> int:
+    """How many nodes have some `batch_pairs`; of many departures no fewer than keep all threads busy."""
+    nodes, slices = max(1, batch_pairs // legs.pairs_per_node), len(problem.departures)
+    return max(nodes // slices, min(nodes, SPANS * NODES_AT_ONCE * threads_now()))
 
 
 def _evaluated(legs: Legs, source: Index, departure: Array | None, wanted: Bools | None) -> Edges:
     began = time.perf_counter()
     batch = legs.of(source, departure, wanted)
+    return _edges(source, batch, time.perf_counter() - began)
+
+
+def _followed(follower: Follower, source: Index) -> Edges:
+    """The edges of some nodes at all departures."""
+    began = time.perf_counter()
+    rows = rows_of(source, len(follower.problem.departures)).reshape(len(source), -1)
+    edges = in_order([_edges(rows[:, k], found, 0.0) for k, found in enumerate(follower.slices(source))])
+    return replace(edges, seconds=time.perf_counter() - began)
+
+
+def _edges(source: Index, batch: Found, seconds: float) -> Edges:
+    """Pairs that were looked at as edges and counts."""
     status = batch.outcomes[:, STATUS].astype(np.int64)
     connected = status == Status.CONNECTED
     node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
@@ -92,7 +127,7 @@ def _evaluated(legs: Legs, source: Index, departure: Array | None, wanted: Bools
     by_node: NDArray[np.int32] = counts.reshape(len(source), len(Status)).astype(np.int32)
     target, values = batch.target[connected].astype(np.int32), batch.outcomes[connected, TIME:]
     degree = np.bincount(node[connected], minlength=len(source))
-    return Edges(source, degree, target, values, by_node, time.perf_counter() - began)
+    return Edges(source, degree, target, values, by_node, seconds)
 
 
 @dataclass
@@ -132,6 +167,17 @@ def build_roadmap(
         >>> glider_stream.build_roadmap(problem).target.size
         929
     """
+    require(len(problem.departures) == 1, "a roadmap of several departures is built by `build_slices`")
+    return build_slices(problem, thread_count, progress, batch_pairs).at(0)
+
+
+def build_slices(
+    problem: Problem,
+    thread_count: int | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+    batch_pairs: int = BATCH_PAIRS,
+) -> SlicedRoadmap:
+    """A problem's roadmap, in memory, of all its departures."""
     position = node_positions(problem)
     parts: list[Edges] = []
     with threads(thread_count) as used:
@@ -140,19 +186,19 @@ def build_roadmap(
             provenance_of(problem, position),
             problem,
             position,
-            lambda nodes: find_edges(problem, position, nodes, batch_pairs),
+            lambda one, nodes: find_edges(one, position, nodes, batch_pairs),
         )
-        tally = Tally(len(position), used)
+        tally = Tally(len(position) * len(problem.departures), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
             parts.append(edges)
             progress(tally.add(edges))
-    return roadmap_of(problem, position, in_order(parts), made, tally)
+    return _slices_of(problem, position, in_order(parts), made, tally)
 
 
-def roadmap_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> Roadmap:
-    """A roadmap of nodes (n, 3) [m] and the edges of all of them."""
+def _slices_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> SlicedRoadmap:
     values: dict[str, Any] = {n: np.ascontiguousarray(edges.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
-    return Roadmap(
+    return SlicedRoadmap(
+        departures=np.array(problem.departures),
         position=position,
         indptr=np.concatenate([[0], np.cumsum(edges.degree)]),
         target=edges.target,
@@ -161,6 +207,11 @@ def roadmap_of(problem: Problem, position: Array, edges: Edges, made: Provenance
         counts=tally.by_name(),
         wall_s=tally.seconds,
         threads=tally.threads,
-        node_counts=edges.counts,
+        row_counts=edges.counts,
         **values,
     )
+
+
+def roadmap_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> Roadmap:
+    """A roadmap of nodes (n, 3) [m] and the edges of all of them, at the problem's one departure."""
+    return _slices_of(problem, position, edges, made, tally).at(0)

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from ..base.settings import require
 from ..base.terminal import plain
 from .roadmap import EDGE_FIELDS, Roadmap
+from .slices import SlicedRoadmap
+
+AnyRoadmap = Roadmap | SlicedRoadmap
 
 WORDS = {
     "flow_sha256": "flow",
@@ -29,7 +32,7 @@ class Difference:
     """`made`: what made them differently, by name, with both values; `scenario`: the lines that only one has.
 
     `edges`: how many only the first has, only the second, and both; `times` [s]: the greatest difference in
-    the time of an edge that both have, and how many differ. None where the nodes are not the same.
+    the time of an edge that both have, and how many differ. None where nodes or departures are not the same.
     """
 
     made: dict[str, tuple[str, str]]
@@ -67,7 +70,7 @@ class Difference:
             more = len(lines_of_one) - MOST_LINES
             lines += [f"{mark} ... {more} lines more"] if more > 0 else []
         if self.edges is None or self.times is None:
-            lines.append("their nodes are not the same, so no edge is compared")
+            lines.append("their nodes, or their departures, are not the same, so no edge is compared")
         elif self.same_edges:
             lines.append(f"all {self.edges[2]:,} edges are the same")
         else:
@@ -78,7 +81,7 @@ class Difference:
         return "\n".join(lines)
 
 
-def difference(first: Roadmap, second: Roadmap) -> Difference:
+def difference(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
     """What differs between two roadmaps."""
     made = {}
     for key, word in WORDS.items():
@@ -89,7 +92,8 @@ def difference(first: Roadmap, second: Roadmap) -> Difference:
     unshared = tuple(
         tuple(line for line in text if line and line not in set(other)) for text, other in (texts, texts[::-1])
     )
-    if first.position.tobytes() != second.position.tobytes():
+    slices = [road.departures.tobytes() if isinstance(road, SlicedRoadmap) else b"" for road in (first, second)]
+    if first.position.tobytes() != second.position.tobytes() or slices[0] != slices[1]:
         return Difference(made, (unshared[0], unshared[1]), None, None)
     keys = _keys(first), _keys(second)
     both, in_first, in_second = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
@@ -101,8 +105,8 @@ def difference(first: Roadmap, second: Roadmap) -> Difference:
     return Difference(made, (unshared[0], unshared[1]), counts, (apart, int(unlike.sum())))
 
 
-def _keys(road: Roadmap) -> NDArray[np.int64]:
-    """A number for each edge, by its source and target."""
-    nodes = len(road.position)
+def _keys(road: AnyRoadmap) -> NDArray[np.int64]:
+    """A number for each edge, by its source, its slice and its target."""
+    nodes, rows = len(road.position), len(road.indptr) - 1
     require(nodes < 2**31, f"a roadmap of {nodes:,} nodes is too large to compare")
-    return np.repeat(np.arange(nodes, dtype=np.int64), np.diff(road.indptr)) * nodes + road.target
+    return np.repeat(np.arange(rows, dtype=np.int64), np.diff(road.indptr)) * nodes + road.target

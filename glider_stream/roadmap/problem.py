@@ -1,8 +1,8 @@
 """The problem: a scenario made into objects."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class Problem:
     x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
     where known. `frozen`: queries take every leg as at the departure, though the flow changes; `bins` [s]:
     queries keep ways to one node apart that arrive in different bins of time. `flow_words`, `glider_words` say
-    what they are. `domain` is that of the scenario.
+    what they are. `domain` is that of the scenario. `slices`: departures [s], rising, of a roadmap of several.
 
     Examples:
         >>> problem = glider_stream.read_scenario("small.toml").problem()
@@ -48,6 +48,17 @@ class Problem:
     frozen: bool = False
     bins: float | None = None
     domain: BoxDomain | GeographicDomain | None = None
+    slices: tuple[float, ...] = ()
+
+    @property
+    def departures(self) -> tuple[float, ...]:
+        """Of all slices of the roadmap [s]: its one departure where the scenario has no [departures]."""
+        return self.slices or (self.departure,)
+
+    def leaving(self, since: float) -> "Problem":
+        """The same problem for gliders that leave `since` [s] later."""
+        departs = None if self.departs is None else self.departs + timedelta(seconds=since)
+        return replace(self, departure=self.departure + since, departs=departs)
 
     def check_point(self, point: Array, name: str) -> None:
         """InputError unless a glider can be at `point` (3,) [m]."""

@@ -17,6 +17,7 @@ from ..water.inspect import flow_sha256
 from .inputs import inputs_of, names_of
 from .problem import Problem
 from .roadmap import Provenance, Roadmap
+from .slices import SlicedRoadmap
 
 
 def lonlat_of(problem: Problem, position: Array) -> Array | None:
@@ -47,7 +48,7 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
     )
 
 
-def check_unchanged(roadmap: Roadmap, problem: Problem) -> None:
+def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
     """InputError unless flow, terrain and glider are those that the roadmap was built with."""
     made = roadmap.provenance
     for name, digest, now in (

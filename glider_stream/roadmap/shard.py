@@ -22,13 +22,18 @@ class Shard:
         """The first source node, and that after the last, of `count` nodes."""
         return (self.number - 1) * count // self.count, self.number * count // self.count
 
+    def rows(self, count: int, slices: int) -> tuple[int, int]:
+        """As `nodes`, of the rows of edges that `count` nodes have: one for each departure."""
+        first, last = self.nodes(count)
+        return first * slices, last * slices
+
     def __str__(self) -> str:
         return f"{self.number}/{self.count}"
 
 
 @dataclass(frozen=True)
 class Part:
-    """A shard out of its file; `edges` are None where only the head was read."""
+    """A shard out of its file; `edges` are None where only the head was read; `departures` of a sliced one."""
 
     shard: Shard
     provenance: Provenance
@@ -37,3 +42,4 @@ class Part:
     edges: Edges | None
     wall_s: float
     threads: int
+    departures: Array | None = None

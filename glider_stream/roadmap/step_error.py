@@ -72,21 +72,32 @@ class StepSample:
         self.parts: list[Edges] = []
 
     def take(self, edges: Edges) -> None:
-        """Keep what an earlier run, or an older roadmap, knows of these nodes."""
+        """Keep what an earlier run, or an older roadmap, of one departure, knows of these nodes."""
         self.parts.append(edges.of(np.isin(edges.source, self.nodes)))
 
     def checked(
-        self, made: Provenance, problem: Problem, position: Array, find: Callable[[Index], Iterable[Edges]]
+        self,
+        made: Provenance,
+        problem: Problem,
+        position: Array,
+        find: Callable[[Problem, Index], Iterable[Edges]],
     ) -> Provenance:
         """What makes a roadmap, with words on its steps; InputError where they are too coarse.
 
-        `find` evaluates some of the nodes `position` (n, 3) [m].
+        `find` evaluates some of the nodes `position` (n, 3) [m] at the departure of a problem. Of many departures
+        the first, the last and the one in the middle are looked at, anew each time.
         """
-        missing = np.setdiff1d(self.nodes, in_order(self.parts).source)
-        edges = in_order([*self.parts, *(find(missing) if missing.size else ())])
-        error = step_error(problem, position[np.repeat(edges.source, edges.degree)], edges.values)
-        error.check()
-        return replace(made, steps=str(error))
+        times = problem.departures
+        errors = []
+        for when in sorted({times[0], times[len(times) // 2], times[-1]}):
+            one = replace(problem, departure=when, slices=())
+            missing = np.setdiff1d(self.nodes, in_order(self.parts).source)
+            edges = in_order([*self.parts, *(find(one, missing) if missing.size else ())])
+            errors.append(step_error(one, position[np.repeat(edges.source, edges.degree)], edges.values))
+        worst = max(errors, key=lambda error: error.off)
+        worst = replace(worst, legs=sum(error.legs for error in errors))
+        worst.check()
+        return replace(made, steps=str(worst))
 
 
 def check_steps(roadmap: Roadmap, problem: Problem) -> None:

@@ -1,4 +1,4 @@
-"""The roadmap file: HDF5, format version 1. Nothing else knows h5py."""
+"""The roadmap file: HDF5, format versions 1 and 2, of many departures. Nothing else knows h5py."""
 
 import contextlib
 import hashlib
@@ -22,11 +22,13 @@ from ..kernels.edges import Status
 from .builder import Tally
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
 from .shard import Part, Shard
+from .slices import SlicedRoadmap
 
 AnyArray = NDArray[Any]
 FORMAT = "glider-stream/roadmap"
 PART_FORMAT = "glider-stream/roadmap-part"
-VERSION = 1
+VERSION, SLICED_VERSION = 1, 2
+"""A roadmap of one departure, and of several; see docs/roadmap-format.md."""
 CHUNK = 32768
 """Edges in a chunk of a dataset, 256 kB: one is checked and cached whole."""
 CHECKED = 16 * CHUNK
@@ -35,7 +37,8 @@ CHECKED = 16 * CHUNK
 _DESCRIBED = {
     "nodes/position": ("f8", "m", "node position: x east, y north, z upward from the surface"),
     "nodes/lonlat": ("f8", "degrees", "node longitude and latitude"),
-    "edges/indptr": ("i8", "1", "first edge of each source node, CSR"),
+    "slices/departure": ("f8", "s", "departure of each slice since the epoch"),
+    "edges/indptr": ("i8", "1", "first edge of each source node, CSR; of several slices of each node and slice"),
     "edges/target": ("i4", "1", "target node"),
     "edges/time": ("f8", "s", "time from departure to closest approach"),
     "edges/cost": ("f8", "", "cost of the leg: its travel time, or the energy that it takes"),
@@ -43,9 +46,10 @@ _DESCRIBED = {
     "edges/heading": ("f8", "rad", "heading through water, counter-clockwise from east"),
     "edges/speed": ("f8", "m s-1", "speed through water along the glide path"),
     "edges/miss": ("f8", "m", "distance from the target at closest approach"),
-    "pairs/by_node": ("i4", "1", "pairs of each source node by status, in the order of the attribute `statuses`"),
+    "pairs/by_node": ("i4", "1", "pairs of each row of edges by status, named by the attribute `statuses`"),
 }
 _OPTIONAL = {"nodes/lonlat", "pairs/by_node"}
+_SLICES = "slices/departure"
 
 
 class Guarded(io.FileIO):
@@ -87,6 +91,7 @@ class RoadmapWriter:
         lonlat: AnyArray | None,
         made: Provenance,
         shard: Shard,
+        departures: AnyArray | None,
     ) -> None:
         """Write what is known before the edges are."""
         self._disk, self._file = disk, file
@@ -94,20 +99,23 @@ class RoadmapWriter:
         self._waiting: list[Edges] = []
         self._degree: list[AnyArray] = []
         self._counts: list[AnyArray] = []
-        self._next, self._last = shard.nodes(len(position))
+        slices = 1 if departures is None else len(departures)
+        self._next, self._last = shard.rows(len(position), slices)
         self.digests: dict[str, Any] = {}
         file.attrs["format"] = FORMAT if shard.whole else PART_FORMAT
         if not shard.whole:
             file.attrs["shard"] = str(shard)
-        file.attrs["format_version"] = VERSION
+        file.attrs["format_version"] = VERSION if departures is None else SLICED_VERSION
         for name, value in asdict(made).items():
             file.attrs[name] = value
         self._put("nodes/position", position)
         if lonlat is not None:
             self._put("nodes/lonlat", lonlat)
+        if departures is not None:
+            self._put(_SLICES, departures)
 
     def append(self, edges: Edges) -> None:
-        """Take the edges of the next nodes; RuntimeError if they are others, as only a bug hands over."""
+        """Take the edges of the next rows, node by node; RuntimeError if they are others, as only a bug gives."""
         follows = np.array_equal(edges.source, np.arange(self._next, self._next + edges.source.size))
         whole = edges.degree.sum() == edges.target.size == len(edges.values)
         if not follows or not whole:
@@ -170,12 +178,20 @@ class RoadmapWriter:
 
 @contextlib.contextmanager
 def writing(
-    path: str | Path, position: AnyArray, lonlat: AnyArray | None, made: Provenance, shard: Shard
+    path: str | Path,
+    position: AnyArray,
+    lonlat: AnyArray | None,
+    made: Provenance,
+    shard: Shard,
+    departures: AnyArray | None = None,
 ) -> Iterator[RoadmapWriter]:
-    """A roadmap file in the making; at `path` when the block ends well, and not at all else."""
+    """A roadmap file in the making; at `path` when the block ends well, and not at all else.
+
+    `departures` (slices,) [s] make a file of several slices.
+    """
     with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
         with h5py.File(disk, "w") as file:
-            writer = RoadmapWriter(disk, file, position, lonlat, made, shard)
+            writer = RoadmapWriter(disk, file, position, lonlat, made, shard, departures)
             yield writer
         disk.check()
         _check_written(temporary, Path(path), writer.digests)
@@ -192,7 +208,7 @@ def _check_written(temporary: Path, path: Path, digests: dict[str, Any]) -> None
                 raise Unwritable(f"the output {path} cannot be written whole: its {name} reads back otherwise")
 
 
-def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
+def write_roadmap(roadmap: Roadmap | SlicedRoadmap, path: str | Path) -> None:
     """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all.
 
     Examples:
@@ -200,48 +216,84 @@ def write_roadmap(roadmap: Roadmap, path: str | Path) -> None:
         >>> glider_stream.write_roadmap(roadmap, "copy.h5")
     """
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
-    nodes = len(roadmap.position)
-    counts = np.zeros((nodes, len(Status)), np.int32) if roadmap.node_counts is None else roadmap.node_counts
-    tally = Tally(
-        nodes, roadmap.threads, np.array([roadmap.counts[s.name.lower()] for s in Status]), roadmap.wall_s
-    )
-    with writing(path, roadmap.position, roadmap.lonlat, roadmap.provenance, Shard(1, 1)) as file:
-        file.append(Edges(np.arange(nodes), np.diff(roadmap.indptr), roadmap.target, values, counts))
+    known, departures = None, None
+    if isinstance(roadmap, SlicedRoadmap):
+        known, departures = roadmap.row_counts, roadmap.departures
+    else:
+        known = roadmap.node_counts
+    rows = len(roadmap.indptr) - 1
+    counts = np.zeros((rows, len(Status)), np.int32) if known is None else known
+    by_status = np.array([roadmap.counts[s.name.lower()] for s in Status])
+    tally = Tally(rows, roadmap.threads, by_status, roadmap.wall_s)
+    what = roadmap.position, roadmap.lonlat, roadmap.provenance, Shard(1, 1), departures
+    with writing(path, *what) as file:
+        file.append(Edges(np.arange(rows), np.diff(roadmap.indptr), roadmap.target, values, counts))
         file.finish(tally)
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
-    """Read a roadmap file; InputError where it is not one, newer, incomplete or damaged.
+    """Read the file of a roadmap of one departure; InputError where it is none, newer, incomplete or damaged.
 
     Examples:
         >>> glider_stream.read_roadmap("small.h5").target.size
         929
     """
+    roadmap = read_any_roadmap(path)
+    if isinstance(roadmap, SlicedRoadmap):
+        first, last = roadmap.departures[[0, -1]]
+        raise InputError(
+            f"the roadmap {path} is of {roadmap.departures.size} departures, from {first:g} s to {last:g} s, and "
+            "this takes one; `query` and `info` read it, or build it without [departures]"
+        )
+    return roadmap
+
+
+def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
+    """Read a roadmap file, of one departure or of several; InputError where it is none, or damaged."""
     path = Path(path)
     with _reading(path) as file:
         _check_head(file, path, FORMAT)
-        arrays = _arrays(file, path, list(_DESCRIBED))
-        _check_edges(arrays, len(arrays["nodes/position"]), path)
+        departures = _departures(file, path)
+        arrays = _arrays(file, path, _names())
+        slices = 1 if departures is None else departures.size
+        _check_edges(arrays, len(arrays["nodes/position"]) * slices, path)
         wall, used = _effort(file, path)
         pairs = file["pairs"].attrs
         counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
         counted = min(counts.values()) >= 0
         require(counted, f"the roadmap {path} is damaged: a count of its pairs makes no sense; build it again")
-        values: dict[str, Any] = {name: arrays[f"edges/{name}"] for name in EDGE_FIELDS}
-        return Roadmap(
-            position=arrays["nodes/position"],
-            indptr=arrays["edges/indptr"],
-            target=arrays["edges/target"],
-            **values,
-            counts=counts,
-            provenance=_provenance(file),
-            wall_s=wall,
-            threads=used,
-            lonlat=arrays.get("nodes/lonlat"),
-            node_counts=arrays.get("pairs/by_node"),
-            file=path,
-        )
+        whole: dict[str, Any] = {
+            "position": arrays["nodes/position"],
+            "indptr": arrays["edges/indptr"],
+            "target": arrays["edges/target"],
+            **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
+            "counts": counts,
+            "provenance": _provenance(file),
+            "wall_s": wall,
+            "threads": used,
+            "lonlat": arrays.get("nodes/lonlat"),
+            "file": path,
+        }
+        by_row = arrays.get("pairs/by_node")
+        if departures is None:
+            return Roadmap(**whole, node_counts=by_row)
+        return SlicedRoadmap(departures, **whole, row_counts=by_row)
     raise AssertionError  # _reading raises
+
+
+def _names() -> list[str]:
+    """The datasets that every version has."""
+    return [name for name in _DESCRIBED if name != _SLICES]
+
+
+def _departures(file: h5py.File, path: Path) -> AnyArray | None:
+    """The departures [s] of a file of several; None where it is of one."""
+    if int(file.attrs["format_version"]) == VERSION:
+        return None
+    times = _arrays(file, path, [_SLICES])[_SLICES]
+    rises = times.ndim == 1 and times.size > 0 and bool((np.diff(times) > 0).all())
+    require(rises, f"the roadmap {path} is damaged: its departures do not rise; build it again")
+    return times
 
 
 def read_part(path: str | Path, edges: bool = True) -> Part:
@@ -254,8 +306,10 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
         require(
             1 <= shard.number <= shard.count, f"the part {path} is damaged: it says it is {shard}; build it again"
         )
-        arrays = _arrays(file, path, list(_DESCRIBED) if edges else ["nodes/position", "nodes/lonlat"])
-        nodes = np.arange(*shard.nodes(len(arrays["nodes/position"])))
+        departures = _departures(file, path)
+        arrays = _arrays(file, path, _names() if edges else ["nodes/position", "nodes/lonlat"])
+        slices = 1 if departures is None else departures.size
+        nodes = np.arange(*shard.rows(len(arrays["nodes/position"]), slices))
         found = None
         if edges:
             _check_edges(arrays, len(nodes), path)
@@ -266,9 +320,8 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
             degree = np.diff(arrays["edges/indptr"])
             found = Edges(nodes, degree, arrays["edges/target"], values, arrays["pairs/by_node"])
         made = _provenance(file)
-        return Part(
-            shard, made, arrays["nodes/position"], arrays.get("nodes/lonlat"), found, *_effort(file, path)
-        )
+        places = arrays["nodes/position"], arrays.get("nodes/lonlat")
+        return Part(shard, made, *places, found, *_effort(file, path), departures)
     raise AssertionError  # _reading raises
 
 
@@ -302,9 +355,9 @@ def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
     require(said == wanted, f"{path} is not {noun}, its format is {what}; give a file that `{command}` wrote")
     version = int(file.attrs["format_version"])
     require(
-        version == VERSION,
-        f"the roadmap {path} has format version {version}, this program reads version {VERSION}; "
-        + ("update the program" if version > VERSION else "build it again"),
+        version in (VERSION, SLICED_VERSION),
+        f"the roadmap {path} has format version {version}, this program reads versions {VERSION} and "
+        f"{SLICED_VERSION}; " + ("update the program" if version > SLICED_VERSION else "build it again"),
     )
     complete = file.attrs.get("complete", False)
     require(

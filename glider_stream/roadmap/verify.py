@@ -1,7 +1,7 @@
 """Verification: is a roadmap what it says; its legs flown again, by its own integrator and by another."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,8 @@ from .evaluator import Evaluator
 from .problem import Problem
 from .provenance import check_unchanged
 from .roadmap import EDGE_FIELDS, Roadmap
-from .store import read_roadmap
+from .slices import SlicedRoadmap
+from .store import read_any_roadmap
 
 LEGS_AT_ONCE = 10
 """Legs that DOP853 flies together: its step is the one that the most crooked of them needs."""
@@ -142,7 +143,9 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
         off[e, 1] = speed - glide_speed(medium.polar, 1 if angle > 0.0 else 0, abs(angle))
 
 
-def verify(file: str | Path, problem_of: Callable[[Roadmap], Problem], sample: int = 200) -> Verification:
+def verify(
+    file: str | Path, problem_of: Callable[[Roadmap | SlicedRoadmap], Problem], sample: int = 200
+) -> Verification:
     """Look at a roadmap file: whole, made by the flow and glider that its scenario names, its legs as they say.
 
     `problem_of` makes the problem of a roadmap. All edges are flown again as they were found, a
@@ -151,12 +154,37 @@ def verify(file: str | Path, problem_of: Callable[[Roadmap], Problem], sample: i
     require(sample >= 0, f"`sample` must be at least 0, all; got {sample}")
     require(Path(file).is_file(), f"the roadmap {file} does not exist; build it first")
     try:
-        road = read_roadmap(file)
+        road = read_any_roadmap(file)
         problem = problem_of(road)
         check_unchanged(road, problem)
     except InputError as error:
         return Verification(str(file), 0, 0, (str(error),), np.empty(0), ())
+    if isinstance(road, SlicedRoadmap):
+        return check_slices(str(file), road, problem, sample)
     return check_edges(str(file), road, problem, sample)
+
+
+def check_slices(name: str, road: SlicedRoadmap, problem: Problem, sample: int) -> Verification:
+    """What `verify` says of a roadmap of several departures: of each slice, with a part of the sample."""
+    slices = road.departures.size
+    parts = []
+    for number, departure in enumerate(road.departures):
+        share = 0 if sample == 0 else max(1, (sample * (number + 1)) // slices - (sample * number) // slices)
+        parts.append(check_edges(name, road.at(number), replace(problem, departure=float(departure)), share))
+    faults = [
+        f"at departure {departure:g} s: {fault}"
+        for departure, part in zip(road.departures, parts, strict=True)
+        for fault in part.faults
+    ]
+    worst = sorted((one for part in parts for one in part.worst), key=lambda one: -one[2])[:WORST]
+    return Verification(
+        name,
+        sum(part.edges for part in parts),
+        sum(part.sample for part in parts),
+        tuple(faults),
+        np.concatenate([part.differences for part in parts]),
+        tuple(worst),
+    )
 
 
 def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Verification:

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from ..base.arrays import Array
 from ..base.settings import require
 from ..roadmap.builder import node_positions
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import Roadmap
+from ..roadmap.slices import SlicedRoadmap
 from ..water.inspect import is_steady
 from .assembly import RoutePlanner
 from .layered import SurfacingPlanner
@@ -16,28 +19,48 @@ from .moves import improve
 from .path import SURFACE, Path
 from .polish import Polisher
 from .query import Planner
+from .slice_planner import SlicePlanner
+from .sliced import SliceSearch
 from .surfacing import Surfacing
 from .thin import thin
 from .time_dependent import ClockPlanner
 from .trade_off import TradeOff
 
+SAME = 1e-6
+"""Departures [s] that lie no further apart are one: sums of times round."""
 Ends = tuple[Array | None, Array | None]
 """Start and goal (3,) [m]; None for the scenario's own."""
 Refinement = Callable[[Path, Callable[[Path], Path] | None], Path]
 """Refines a path; each round's routes go through the second, if there is one."""
 
 
-def planner_of(problem: Problem, roadmap: Roadmap | None, rule: Surfacing) -> RoutePlanner:
+def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing) -> RoutePlanner:
     """The planner whose paths keep a rule of surfacing, over a roadmap, or over a scenario's nodes if None.
 
-    In a flow that changes the clock runs, and a roadmap gives its nodes alone, but where the problem is `frozen`.
+    In a flow that changes the clock runs, and a roadmap gives its nodes alone, or its slices where it has some;
+    but where the problem is `frozen`.
     """
+    if isinstance(roadmap, SlicedRoadmap):
+        if not problem.frozen:
+            return SlicePlanner(problem, SliceSearch(roadmap, problem), rule)
+        roadmap = _slice_of(roadmap, problem.departure)
     if roadmap is None:
         return ClockPlanner(problem, node_positions(problem), rule, problem.frozen)
     if not is_steady(problem.evaluator.flow) and not problem.frozen:
         check_unchanged(roadmap, problem)
         return ClockPlanner(problem, roadmap.position, rule)
     return Planner(roadmap, problem) if rule == Surfacing() else SurfacingPlanner(roadmap, problem, rule)
+
+
+def _slice_of(roadmap: SlicedRoadmap, departure: float) -> Roadmap:
+    """The slice of a departure [s]; InputError where there is none."""
+    number = np.flatnonzero(np.abs(roadmap.departures - departure) < SAME)
+    times = ", ".join(f"{time:g}" for time in roadmap.departures[:20])
+    what = (
+        f"frozen paths take every leg as at `query.departure` = {departure:g} s, which is no slice of the roadmap"
+    )
+    require(number.size == 1, f"{what}; choose one of: {times} s, or leave `query.frozen` out")
+    return roadmap.at(int(number[0]))
 
 
 def best_path(
@@ -65,11 +88,13 @@ def best_path(
         require(most_energy >= 0, f"`most_energy` must be at least 0 J; got {most_energy:g}")
         _check_energy(planner)
         path = planner.within(*ends, most_energy)
+    notes = path.notes
     if refine is not None:
         path = refine(path, (lambda one: polished(one, planner)) if polish else None)
     elif polish:
         path = polished(path, planner)
-    return path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
+    path = path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
+    return replace(path, notes=notes)
 
 
 def front(planner: RoutePlanner, ends: Ends) -> TradeOff:

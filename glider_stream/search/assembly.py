@@ -33,7 +33,12 @@ class Assembly:
 
     def begins(self, since: float) -> float:
         """The time [s] whose current a leg meets that begins `since` [s] after departure."""
-        return self.problem.departure + since if self.changes and not self.frozen else self.problem.departure
+        return self.problem.departure + since if self.clock_runs else self.problem.departure
+
+    @property
+    def clock_runs(self) -> bool:
+        """Whether each leg meets the current of the time at which it begins."""
+        return self.changes and not self.frozen
 
     def connect(self, start: Array, end: Array, begins: float) -> Edge:
         """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.

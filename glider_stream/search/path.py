@@ -170,11 +170,13 @@ class Path:
         return self.departure is not None and not self.frozen
 
     def water_times(self, leg: Leg, departure: float) -> Array:
-        """The times [s] (m,) of the flow at which a leg's rows were flown; from `departure` if frozen."""
+        """The times [s] (m,) of the flow at which a leg's rows were flown; if frozen all from the departure.
+
+        `departure` is that of a path which does not say its own.
+        """
         since = leg.trajectory[:, 0]
-        if self.departure is not None and not self.frozen:
-            return np.asarray(self.departure + since)
-        return np.asarray(departure + since - since[0])
+        begins = departure if self.departure is None else self.departure
+        return np.asarray(begins + (since if self.clock_runs else since - since[0]))
 
     @property
     def found(self) -> bool:

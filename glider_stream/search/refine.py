@@ -177,19 +177,19 @@ class _Cells:
 
 
 class Refiner:
-    """Rounds of refinement for one route of a problem; `planner` has found it, in `roadmap` if there is one."""
+    """Rounds of refinement for one route of a problem; `planner` has found it."""
 
     def __init__(
         self,
         planner: RoutePlanner,
-        roadmap: Roadmap | None,
         start: Array,
         goal: Array,
         polish: Callable[[Path], Path] | None = None,
     ) -> None:
         """Nothing is done yet; each round's routes go through `polish`, if there is one."""
         self.polish = polish
-        self.planner, self.problem, self.roadmap = planner, planner.problem, roadmap
+        self.planner, self.problem = planner, replace(planner.problem, slices=())
+        self.roadmap = roadmap_under(planner)
         self.start, self.goal = start, goal
         self.clock = planner.assembly.changes and not planner.assembly.frozen
 
@@ -446,21 +446,27 @@ def _costs(
     return since, left, when
 
 
+def roadmap_under(planner: RoutePlanner) -> Roadmap | None:
+    """The roadmap whose legs a planner takes, if there is one."""
+    if isinstance(planner, SurfacingPlanner):
+        return planner.base
+    return planner.roadmap if isinstance(planner, Planner) else None
+
+
 def refined(
     planner: RoutePlanner,
-    roadmap: Roadmap | None,
     ends: tuple[Array | None, Array | None],
     path: Path,
     asked: Asked,
     polish: Callable[[Path], Path] | None = None,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Refined:
-    """A path that `planner` found, in a `roadmap` if there is one, refined; as it is where there is none."""
+    """A path that `planner` found, refined; as it is if it has no leg."""
     if not path.legs:
-        return Refined(path, planner.problem, roadmap)
+        return Refined(path, planner.problem, roadmap_under(planner))
     start = placed_end(planner.problem, ends[0], planner.problem.start, "start")
     goal = placed_end(planner.problem, ends[1], planner.problem.goal, "goal")
-    return Refiner(planner, roadmap, start, goal, polish).refine(path, asked, tell)
+    return Refiner(planner, start, goal, polish).refine(path, asked, tell)
 
 
 def with_added(problem: Problem, roadmap: Roadmap, parts: Sequence[tuple[Array, Edges]]) -> Roadmap:

@@ -7,7 +7,6 @@ the flow as it changes. That needs no roadmap, only nodes.
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import timedelta
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +21,7 @@ from .assembly import RoutePlanner, nodes_at, placed_end
 from .expansion import ClockExpansion, Ends
 from .labels import Aim, LabelSearch
 from .least_time import GreatestSpeeds, LeastTimes
-from .path import Path
+from .path import Hop, Path
 from .surfacing import Surfacing
 from .trade_off import TradeOff, none_within
 from .why_not import why_not
@@ -60,10 +59,7 @@ class ClockPlanner(RoutePlanner):
 
     def leaving(self, since: float) -> "ClockPlanner":
         """The same planner for routes that leave `since` [s] later."""
-        problem = self.problem
-        departs = None if problem.departs is None else problem.departs + timedelta(seconds=since)
-        moved = replace(problem, departure=problem.departure + since, departs=departs)
-        later = ClockPlanner(moved, self.position, self.rule, self.assembly.frozen)
+        later = ClockPlanner(self.problem.leaving(since), self.position, self.rule, self.assembly.frozen)
         later._speeds = self._speeds
         return later
 
@@ -185,11 +181,15 @@ class ClockPlanner(RoutePlanner):
         if number is None and not here:
             return self._no_path(expansion, search, ends.start, ends.goals[goal])
         hops = [] if number is None or here else search.hops(number)
+        self._check_steps(hops)
+        path = self.assembly.path(ends.start, ends.goals[goal], hops)
+        return replace(path, expanded=search.tally.share)
+
+    def _check_steps(self, hops: list[Hop]) -> None:
+        """InputError where the integration's steps are too coarse for some legs."""
         if hops:
             starts, values = np.array([hop[0] for hop in hops]), np.array([hop[2][1:] for hop in hops])
             step_error(self.problem, starts, values).check()
-        path = self.assembly.path(ends.start, ends.goals[goal], hops)
-        return replace(path, expanded=search.tally.share)
 
     def _no_path(self, expansion: ClockExpansion, search: LabelSearch, start: Array, goal: Array) -> Path:
         """The honest no, and why, as far as that is known."""

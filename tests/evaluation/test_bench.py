@@ -59,7 +59,7 @@ def test_what_has_moved():
 
 
 @pytest.mark.parametrize("text", ["no JSON", "[]", "{}", '{"figures": [{"name": 1}]}', '{"figures": 3}'])
-def test_a_record_that_is_none(tmp_path, text):
+def test_a_file_that_is_not_a_record_is_refused(tmp_path, text):
     (tmp_path / "old.json").write_text(text)
     with pytest.raises(InputError, match=r"old.json cannot be read: .*; write it with `bench --json`"):
         read_record(tmp_path / "old.json")

@@ -89,7 +89,7 @@ def run_and_die(work, trap):
 
 @pytest.mark.parametrize("moment", list(MOMENTS))
 @pytest.mark.parametrize("method", ["streamline", "reachable"])
-def test_killed_and_begun_again(place, method, moment):
+def test_a_killed_build_is_started_again(place, method, moment):
     expected.cache_clear()
     whole = expected(method)
     one = problem(place, METHODS[method])
@@ -337,7 +337,7 @@ def test_edges_in_any_order_are_the_same(place):
     assert isinstance(again, Edges)
 
 
-def test_bad_checkpoints(capsys, place):
+def test_unusable_checkpoints_are_refused(capsys, place):
     said = command(capsys, "build", "small.toml", "-o", "road.h5", "--checkpoint=-1")
     assert (said.code, "`checkpoint` must be at least 0 s; got -1" in said.err) == (2, True)
     assert jobs.CHECKPOINT > 0

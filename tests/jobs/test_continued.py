@@ -170,7 +170,7 @@ def test_parts_by_their_nodes():
 
 
 @pytest.mark.parametrize("name", ["env", "road.h5", "a[1]*.h5", "env.local"])
-def test_what_is_left_is_told_from_what_is_not_ours(tmp_path, name):
+def test_left_over_files_are_distinguished_from_files_of_others(tmp_path, name):
     target = tmp_path / name
     suffix = target.suffix
     alien = [

@@ -87,7 +87,7 @@ def test_a_lock_that_is_left_where_there_are_no_locks(output, machine, free):
         pass
 
 
-def test_many_that_take_over_at_once(output):
+def test_many_processes_that_take_a_stale_lock_at_once(output):
     """Of twelve processes that find the same stale lock, one after the other holds it, never two."""
     code = (
         "import sys, os, errno, portalocker, time; from pathlib import Path\n"

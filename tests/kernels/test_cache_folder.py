@@ -26,7 +26,7 @@ def mode_of(folder):
 
 
 @pytest.mark.parametrize("mask", [0o022, 0o002, 0o000])
-def test_what_we_make_is_ours_alone(only, mask):
+def test_our_cache_folder_is_not_open_to_others(only, mask):
     before = os.umask(mask)
     try:
         assert cache.cache_folder() == only[0] / DIGEST

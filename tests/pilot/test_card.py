@@ -52,7 +52,7 @@ def test_station_can_be_held_up_to_the_best_speed_and_not_beyond():
     assert str(said).endswith("faster than the vehicle's 0.36 m/s: it cannot hold station on legs 1, 2, 3, 4")
 
 
-def test_one_dive_and_none():
+def test_one_dive_and_no_dive():
     assert "surface to surface: 0.56 h" in str(card(route(stops=DIVES[:3]), problem(0.5)))
     said = card(route(stops=DIVES[:2]), problem(0.5))
     assert said.under == ()

@@ -105,7 +105,7 @@ def test_degrees_and_minutes(degrees, packed):
 
 
 @pytest.mark.parametrize("text", ["7460.0000", "-18100.0", "north", ""])
-def test_what_is_no_degrees_and_minutes(text):
+def test_texts_that_are_not_degrees_and_minutes(text):
     with pytest.raises(ValueError, match=r".*"):
         from_degrees_and_minutes(text)
 

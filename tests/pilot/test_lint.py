@@ -223,7 +223,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
         (b"a" * 1_000_001, "holds more than 1,000,000 bytes"),
     ],
 )
-def test_what_cannot_be_looked_through_is_exit_code_2(tmp_path, capsys, content, words):
+def test_a_file_that_cannot_be_linted_is_exit_code_2(tmp_path, capsys, content, words):
     file = tmp_path / "some.ma"
     if content is not None:
         file.write_bytes(content)

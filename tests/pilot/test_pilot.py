@@ -188,7 +188,7 @@ def test_a_drawn_route(capsys, tmp_path, monkeypatch):
         ("a.txt", "", "must end in one of"),
     ],
 )
-def test_routes_that_are_none(tmp_path, name, text, words):
+def test_files_without_a_route_are_refused(tmp_path, name, text, words):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=words):
         read_drawn(tmp_path / name)

@@ -71,7 +71,7 @@ def test_what_is_not_known_is_refused_by_name(tmp_path, header, words):
     assert str(refused.value).startswith("a.csv cannot be read as a route: ")
 
 
-def test_what_places_nothing_is_passed_over(tmp_path):
+def test_columns_that_give_no_position_are_ignored(tmp_path):
     text = "id,name,lon,lat,ETA,Speed (kn),remark\n1,a,18.4,38,0,0.5,\n2,b,18.5,38.1,3600,0.5,deep\n"
     assert read(tmp_path, "a.csv", text).places == ((18.4, 38.0, 0.0), (18.5, 38.1, 0.0))
 

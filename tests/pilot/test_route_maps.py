@@ -78,7 +78,7 @@ def test_a_track_is_a_line(tmp_path):
         kml(tmp_path, f"<Placemark><gx:MultiTrack>{2 * track}</gx:MultiTrack></Placemark>")
 
 
-def test_points_of_other_folders_are_no_part_of_the_route(tmp_path):
+def test_points_of_other_folders_are_not_part_of_the_route(tmp_path):
     route_points = mark("a", "18.4,38,0") + mark("b", "18.5,38.1,-200")
     ours = f"<Folder><name>route</name>{route_points}</Folder>"
     other = f"<Folder><name>wrecks</name>{mark('wreck', '18.45,38.05,0', 'relativeToSeaFloor')}</Folder>"
@@ -90,7 +90,7 @@ def test_points_of_other_folders_are_no_part_of_the_route(tmp_path):
     assert kml(tmp_path, f"<Document>{ours}</Document>").places == drawn.places
 
 
-def test_what_marks_were_added_to_our_own_file_are_no_stops(tmp_path):
+def test_marks_that_were_added_to_our_file_are_not_stops(tmp_path):
     export_path(route(), tmp_path / "ours.kml")
     text = (tmp_path / "ours.kml").read_text()
     places = read_drawn(tmp_path / "ours.kml").places

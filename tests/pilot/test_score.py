@@ -124,7 +124,7 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("name", "content", "words"), BROKEN)
-def test_what_is_no_route_is_one_sentence(tmp_path, name, content, words):
+def test_a_file_that_is_not_a_route_gives_one_sentence(tmp_path, name, content, words):
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=words) as refused:
         read_drawn(tmp_path / name)
@@ -132,7 +132,7 @@ def test_what_is_no_route_is_one_sentence(tmp_path, name, content, words):
     assert len(str(refused.value)) < 500
 
 
-def test_what_is_no_text_and_no_file(tmp_path):
+def test_a_route_that_is_not_a_text_or_not_a_file(tmp_path):
     (tmp_path / "a.gpx").write_bytes('<?xml version="1.0"?><!DOCTYPE g><gpx/>'.encode("utf-16"))
     with pytest.raises(InputError, match=r"cannot be read as a route: .*utf-8"):
         read_drawn(tmp_path / "a.gpx")

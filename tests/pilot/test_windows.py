@@ -120,6 +120,6 @@ def test_windows_in_metres_from_the_command_line(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("hours", [0.0, -1.0, float("nan"), float("inf"), 1e-12])
-def test_windows_that_are_none(hours):
+def test_unusable_windows_are_refused(hours):
     with pytest.raises(InputError, match=r"got 0|got -1|got nan|got inf|1e-12 h are more than 100,000"):
         list(windows(route(stops=STOPS), hours))

@@ -73,7 +73,7 @@ class Parts(HTMLParser):
 # what stands in it
 
 
-def test_no_text_ends_what_it_stands_in(sea):
+def test_no_text_can_end_its_script_or_head(sea):
     parts = Parts(sea.read_text("utf-8"))
     names = [name for name, _ in parts.tags]
     assert names.count("script") == 2
@@ -82,7 +82,7 @@ def test_no_text_ends_what_it_stands_in(sea):
     assert not any(name.startswith("on") for _, attributes in parts.tags for name in attributes)
 
 
-def test_it_names_nothing_outside_itself(sea):
+def test_the_page_loads_nothing_from_outside(sea):
     text = sea.read_text("utf-8")
     assert set(re.findall(r"(?:https?:)?//[\w.]+\w[^\s\"']*", re.sub(r"(?m)^\s*//.*$|; // .*$", "", text))) == {
         "http://www.w3.org/2000/svg"
@@ -144,7 +144,7 @@ def test_same_input_same_page(sea, tmp_path):
     assert written(tmp_path, ocean_scene()).read_bytes() == sea.read_bytes()
 
 
-def test_numbers_that_are_no_json_are_a_bug():
+def test_numbers_that_json_does_not_have_are_a_bug():
     with pytest.raises(ValueError, match="JSON"):
         page_text({"a": float("nan")}, "")
 

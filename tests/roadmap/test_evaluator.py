@@ -241,7 +241,7 @@ def test_in_the_plane_a_path_stays_on_its_streamline(planar, glide):
 # degenerate pairs: a defined answer each
 
 
-def test_equal_depth_is_no_edge(evaluator, vortices):
+def test_equal_depth_gives_no_edge(evaluator, vortices):
     edge = evaluator(vortices).connect_pair([0.0, 0.0, -50.0], [60.0, 0.0, -50.0])
     assert edge.status == Status.SAME_DEPTH
     assert np.isnan(edge[1:]).all()
@@ -268,7 +268,7 @@ def test_straight_below_in_a_current_too_weak_or_too_strong(evaluator):
 
 
 @pytest.mark.parametrize("candidates", [1, 2, 3])
-def test_few_candidates_are_no_trouble(evaluator, vortices, candidates):
+def test_few_candidates_work(evaluator, vortices, candidates):
     for goal in ([0.0, 0.0, -60.0], [30.0, 40.0, -60.0]):
         edge = evaluator(vortices, candidates=candidates).connect_pair([0.0, 0.0, 0.0], goal)
         assert edge.status in (Status.CONNECTED, Status.NO_HIT)

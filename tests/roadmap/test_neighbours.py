@@ -46,7 +46,7 @@ def test_nearest_is_the_naive_one(position, k):
 
 
 @every_set
-def test_nearest_to_points_that_are_no_nodes(position):
+def test_nearest_to_points_that_are_not_nodes(position):
     law = Nearest(9).among(position, VOLUME)
     # halfway between nodes: four and eight of them are as near
     for point in (position[0] + 30.0, position[7] + [30.0, 30.0, 0.0], np.array([55.0, 66.0, -77.0])):

@@ -106,7 +106,7 @@ def test_the_other_integrator_sees_what_the_same_one_does_not(sound):
     assert (again.differences > 0).all()
 
 
-def test_what_is_no_roadmap(tmp_path, capsys):
+def test_files_that_are_not_roadmaps(tmp_path, capsys):
     assert command(capsys, "verify", tmp_path / "none.h5").code == 2
     (tmp_path / "text.h5").write_text("no HDF5")
     assert command(capsys, "verify", tmp_path / "text.h5").code == 1

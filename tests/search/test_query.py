@@ -151,7 +151,7 @@ def test_many_goals_from_one_search_and_a_table_are_the_single_queries(router, m
     assert planner.table(roadmap(), starts, []).shape == (len(starts), 0)
 
 
-def test_the_leg_from_end_to_end_is_looked_at(problem, router):
+def test_the_leg_from_end_to_end_is_tried(problem, router):
     start, goal = (-30.0, 20.0, -50.0), (-20.0, 55.0, -20.0)
     direct = problem.evaluator.connect_pair(start, goal)
     assert direct.status == Status.CONNECTED
@@ -162,7 +162,7 @@ def test_the_leg_from_end_to_end_is_looked_at(problem, router):
 
 
 @pytest.mark.parametrize("place", [START, (0.0, 0.0, -75.0), (12.0, 34.0, -56.0)])
-def test_who_is_there_already_need_not_go(router, place):
+def test_a_start_at_the_goal_needs_no_leg(router, place):
     path = router.query(place, place)
     assert (path.found, path.cost, path.travel_time, path.legs) == (True, 0, 0, ())
     assert strict_json(EXPORTS[".json"](path, "path.json", Options())["path.json"]) == {

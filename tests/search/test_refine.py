@@ -94,7 +94,7 @@ def test_new_nodes_lie_in_open_water(problem):
     shallow = replace(problem, evaluator=replace(problem.evaluator, terrain=OpenWater(-100.0)))
     road = build_roadmap(shallow)
     searcher = Planner(road, shallow)
-    result = refined(searcher, road, NOWHERE_ELSE, searcher.query(), TWO_ROUNDS)
+    result = refined(searcher, NOWHERE_ELSE, searcher.query(), TWO_ROUNDS)
     for position, _ in result.parts:
         assert position[:, 2].min() >= -100.0
         assert position[:, 2].max() <= 0.0
@@ -106,14 +106,14 @@ def test_where_yos_turn_at_two_depths_new_nodes_lie_there_too(problem):
     yos = replace(problem, sampler=YoSampler((0.0, 75.0, 150.0), spacing=80.0))
     road = build_roadmap(yos)
     searcher = Planner(road, yos)
-    result = refined(searcher, road, NOWHERE_ELSE, searcher.query(), TWO_ROUNDS)
+    result = refined(searcher, NOWHERE_ELSE, searcher.query(), TWO_ROUNDS)
     assert set(result.parts[0][0][:, 2]) == {0.0, -75.0, -150.0}
 
 
 def test_new_nodes_lie_only_where_a_route_may_be_as_quick(problem):
     road = build_roadmap(replace(problem, sampler=GridSampler((12, 12, 2))))
     searcher = Planner(road, problem)
-    refiner = Refiner(searcher, road, problem.start, problem.goal)
+    refiner = Refiner(searcher, problem.start, problem.goal)
     cloud = refiner._first()
     # the sums are exact: at the start, at the goal, and along the best route they are what it costs
     best = searcher.query()
@@ -140,7 +140,7 @@ def test_the_clock_runs_while_a_route_is_refined(problem, gyre):
     position = node_positions(swinging)
     searcher = ClockPlanner(swinging, position)
     before = searcher.query()
-    result = refined(searcher, None, NOWHERE_ELSE, before, TWO_ROUNDS)
+    result = refined(searcher, NOWHERE_ELSE, before, TWO_ROUNDS)
     after = result.path
     assert after.travel_time < before.travel_time
     assert after.clock_runs

@@ -92,7 +92,7 @@ def test_from_the_command_line(capsys, tmp_path, monkeypatch):
     assert ruled["travel_time_s"] == bound["travel_time_s"]
 
 
-def test_a_rule_that_is_none(tmp_path):
+def test_an_unusable_rule_is_refused(tmp_path):
     road = roadmap()
     problem = read_scenario(scenario_file(tmp_path)).problem()
     loose = SurfacingPlanner(road, problem, Surfacing(50)).query()

@@ -75,7 +75,7 @@ def test_a_route_longer_than_the_stack_is_deep():
     assert [hop[1].tolist() for hop in flights[0]] == stops[1:]
 
 
-def test_what_must_stay_stays():
+def test_stops_that_must_stay_stay():
     stops = [[0.0, 0.0, 0.0], [900.0, 0.0, -50.0], [1800.0, 0.0, -1.0], [2700.0, 0.0, -50.0], [3600.0, 0.0, -2.0]]
     path, flights = route(stops=stops), []
     fly, up = (lambda hops: flights.append(hops) or path), (lambda stop: stop[2] > -10)

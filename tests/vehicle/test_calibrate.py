@@ -254,14 +254,14 @@ def test_dives_too_flat_for_the_vehicle_and_far_off_are_named(tmp_path):
         ('w,u\n0.1,"' + "0" * 200_000 + '"\n', "cannot be read as CSV: field larger"),
     ],
 )
-def test_dives_that_are_none(tmp_path, text, words):
+def test_files_without_dives_are_refused(tmp_path, text, words):
     (tmp_path / "dives.csv").write_text(text)
     with pytest.raises(InputError, match=words) as error:
         calibrate(read_dives(tmp_path / "dives.csv"))
     assert "\n" not in str(error.value)
 
 
-def test_columns_by_another_name(tmp_path, capsys):
+def test_columns_with_other_names(tmp_path, capsys):
     dives(tmp_path, SPEEDS, 0, seaglider)
     path = tmp_path / "dives.csv"
     assert "choose from: seaglider, slocum" in command(capsys, "calibrate", path, "--preset", "paper").err

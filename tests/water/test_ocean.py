@@ -173,7 +173,7 @@ def test_packed_integers(tmp_path):
 
 @pytest.mark.parametrize("fill", [1e20, 1.2676506e30, 9.96921e36, -9999.0, np.nan, 999.0, -99.0])
 @pytest.mark.parametrize("declared", [True, False])
-def test_fills_are_no_water_and_do_not_reach_beside_the_coast(tmp_path, fill, declared):
+def test_fill_values_are_not_water_and_do_not_spoil_the_coast(tmp_path, fill, declared):
     data = both(dataset(), lambda one: one.where(one.lon > 20.25, fill))
     encoding = {"uo": {"_FillValue": fill}, "vo": {"_FillValue": fill}} if declared else {}
     file = read_currents(written(tmp_path, data, encoding=encoding))

@@ -35,13 +35,13 @@ SWAPPED = "with longitude and latitude swapped it would lie inside"
         (BOX, (400.0, 450.0), "x from 0 to 100 m and y from 300 to 500 m; move it inside"),
     ],
 )
-def test_what_is_said(domain, place, words):
+def test_the_message_on_a_place_outside(domain, place, words):
     said = domain.outside(*place)
     assert bool(said) == bool(words)
     assert words in said
 
 
-def test_a_latitude_that_is_none_may_be_a_longitude():
+def test_an_impossible_latitude_may_be_a_longitude():
     with pytest.raises(InputError, match=f"-19, 179.5 are not a longitude .*{SWAPPED}"):
         PACIFIC.point((-19.0, 179.5, 0.0))
     with pytest.raises(InputError, match=r"degrees; give LON,LAT,DEPTH$"):

@@ -77,7 +77,7 @@ def test_no_data_among_depths_that_count_down(tmp_path, mark):
         -9000.0 - 1500.0 * (LAT[:, None] - 37.5) + 0 * LON,  # a trench, through -9999 and -10000
     ],
 )
-def test_depths_are_no_marks(ground):
+def test_depths_are_not_taken_for_codes(ground):
     gone, found = undeclared(ground)
     assert not gone.any()
     assert found == []
@@ -255,7 +255,7 @@ def test_a_figure_draws_the_ground_and_no_clearance(tmp_path):
         assert (terrain.bottom == 0).sum() > 4
 
 
-def test_a_chart_without_currents_below_is_no_seabed(tmp_path):
+def test_the_end_of_the_levels_is_not_drawn_as_seabed(tmp_path):
     """Where nothing but the end of the levels closes the water, no ground is drawn."""
     lon, lat = np.arange(17.5, 18.51, 0.1), np.arange(37.5, 38.51, 0.1)
     written(tmp_path, dataset(lon=lon, lat=lat, depth=[0.0, 50.0, 100.0, 150.0]))

@@ -226,7 +226,7 @@ def test_a_scale_factor_left_over_on_floats_is_noted(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["values", "masks"])
-def test_what_flags_call_bad_is_no_data(tmp_path, how):
+def test_values_that_flags_call_bad_are_no_data(tmp_path, how):
     flag = np.ones((LAT.size, LON.size), np.int8)
     flag[:, 7:] = 4
     meanings = {
@@ -444,7 +444,7 @@ def test_a_name_that_no_file_holds_is_an_error(tmp_path, key):
         read_currents(path, names)
 
 
-def test_a_name_that_is_no_coordinate_of_the_current_is_an_error(tmp_path):
+def test_a_name_that_is_not_a_coordinate_of_the_current_is_an_error(tmp_path):
     data = dataset().assign(other=("other", np.arange(3.0)))
     with pytest.raises(
         InputError, match=r"`depth` = 'other' is not a coordinate of `uo` in currents.nc, which has 'depth"
@@ -485,7 +485,7 @@ def test_other_formats_name_the_tool_that_converts_them(tmp_path, name):
 
 
 @pytest.mark.slow
-def test_an_error_of_our_own_is_no_damage_of_the_file(tmp_path):
+def test_an_error_of_our_own_is_not_reported_as_damage(tmp_path):
     """Exit code 3, one line, and the trace where it is asked for; a truncated file is still exit code 2."""
     path = written(tmp_path, dataset())
     program = (

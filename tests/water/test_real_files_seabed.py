@@ -183,7 +183,7 @@ def sigma_file(folder, which, h=400.0):
     return written(folder, data, "sigma.nc"), -z[which]
 
 
-def test_some_sigma_levels_are_no_whole_column(tmp_path):
+def test_some_sigma_levels_are_not_a_whole_column(tmp_path):
     path, at = sigma_file(tmp_path, slice(None))
     for depth in (0.0, 30.0, 250.0):
         assert water(path, 20.5, 60.5, depth) == pytest.approx(current(20.5, 60.5, depth), abs=5e-3)

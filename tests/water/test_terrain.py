@@ -179,7 +179,7 @@ def test_polygons_across_the_date_line_and_holes(tmp_path):
         ("[" * 100_000, "is not a GeoJSON"),
     ],
 )
-def test_polygons_that_are_none(tmp_path, text, words):
+def test_files_without_polygons_are_refused(tmp_path, text, words):
     (tmp_path / "bad.geojson").write_text(text)
     with pytest.raises(InputError, match=words) as refusal:
         read_polygons(tmp_path / "bad.geojson", FRAME)

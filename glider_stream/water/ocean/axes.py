@@ -19,10 +19,13 @@ MOST_POINTS = 100_000_000
 
 def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
     """Return a rising axis with each longitude once, and the indices of its values in the file."""
-    broken = f"the {WORDS[kind]} `{variable.name}` in {name}"
-    require(variable.size <= MOST_POINTS, f"{broken} claims {variable.size:,} points; cut the file")
+    subject = f"the {WORDS[kind]} `{variable.name}` in {name}"
+    require(variable.size <= MOST_POINTS, f"{subject} claims {variable.size:,} points; cut the file")
     axis = np.asarray(variable.values, dtype=np.float64).ravel()
-    require(bool(np.isfinite(axis).all()), f"{broken} has missing values")
+    require(
+        bool(np.isfinite(axis).all()),
+        f"{subject} has missing values; mend them, or set another `{kind}` in `names`",
+    )
     order = np.arange(axis.size)
     if str(variable.attrs.get("units", "")).strip().lower() in ("radian", "radians", "rad"):
         axis = np.degrees(axis)
@@ -31,8 +34,11 @@ def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
     if kind == "lon":
         axis, order = _once_around(axis, order)
     else:
-        require(bool((np.abs(axis) <= 90.001).all()), f"{broken} reaches beyond 90 degrees")
-    require(bool((np.diff(axis) > 0).all()), f"{broken} does not rise or fall steadily")
+        furthest = float(np.abs(axis).max(initial=0.0))
+        cure = "mend it, or set another `lat` in `names`"
+        require(furthest <= 90.001, f"{subject} reaches {furthest:g} degrees, beyond a pole; {cure}")
+    cure = f"sort the file, or set another `{kind}` in `names`"
+    require(bool((np.diff(axis) > 0).all()), f"{subject} does not rise or fall steadily; {cure}")
     return axis, order
 
 
@@ -109,16 +115,20 @@ def _continued(values: Array) -> Array:
 def depths(name: str, variable: Any, names: Names) -> tuple[Array, Index, float, str]:
     """Return rising depths [m, downward], their indices in the file, the metres in its unit, and a text."""
     axis = np.atleast_1d(np.asarray(variable.values, dtype=np.float64)).ravel()
-    broken = f"the depth `{variable.name}` in {name}"
-    require(bool(np.isfinite(axis).all()), f"{broken} has missing values")
+    subject = f"the depth `{variable.name}` in {name}"
+    require(
+        bool(np.isfinite(axis).all()),
+        f"{subject} has missing values; mend them, or set another `depth` in `names`",
+    )
     units = units_of(variable).lower()
     factor = in_metres(units)
     if factor is None:
-        raise InputError(f"{broken} is in {units!r}, not in metres: convert it first")
+        raise InputError(f"{subject} is in {units!r}, not in metres: convert it first")
     below, above = bool((axis <= 0).all()), bool((axis >= 0).all())
     require(
         below or above,
-        f"{broken} runs from {axis.min():g} to {axis.max():g}, on both sides of the surface",
+        f"{subject} runs from {axis.min():g} to {axis.max():g}, on both sides of the surface; mend it, or set "
+        "another `depth` in `names`",
     )
     claim = names.positive or str(variable.attrs.get("positive", "")).strip().lower()
     if claim not in ("up", "down"):
@@ -127,11 +137,12 @@ def depths(name: str, variable: Any, names: Names) -> tuple[Array, Index, float,
     # heights above the seabed have the same signs, so the sign alone must not decide
     require(
         claim in ("", sense),
-        f"{broken} is declared positive {claim}, but runs from {axis[0]:g} to {axis[-1]:g}: "
+        f"{subject} is declared positive {claim}, but runs from {axis[0]:g} to {axis[-1]:g}: "
         f'if these are depths under the surface, set `positive` = "{sense}" in `names`',
     )
     axis, order = np.abs(axis) * factor, np.arange(axis.size)
     if axis.size > 1 and bool(axis[0] > axis[-1]):
         axis, order = axis[::-1], order[::-1]
-    require(bool((np.diff(axis) > 0).all()), f"{broken} does not rise or fall steadily")
+    cure = "sort the file, or set another `depth` in `names`"
+    require(bool((np.diff(axis) > 0).all()), f"{subject} does not rise or fall steadily; {cure}")
     return axis, order, factor, f"{variable.name}, positive {sense}"

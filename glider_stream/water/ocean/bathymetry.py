@@ -49,9 +49,10 @@ class Chart:
         known = self.positive in (None, "up", "down")
         require(known, f'`positive` must be "up" or "down"; got {self.positive!r}')
         fits = {"lon", "lat", "units", "positive", "group"}
-        alien = [key for key, value in vars(self.names).items() if value is not None and key not in fits]
+        unknown = [key for key, value in vars(self.names).items() if value is not None and key not in fits]
         require(
-            not alien, f"`terrain.names` may hold {', '.join(sorted(fits))}; got {', '.join(alien)}: leave it out"
+            not unknown,
+            f"`terrain.names` may hold {', '.join(sorted(fits))}; got {', '.join(unknown)}: leave it out",
         )
 
 
@@ -71,7 +72,7 @@ def read_bathymetry(
     units, group) are needed where the file does not give them. Points without data are land.
     """
     path, given = Path(file), names or Names()
-    asked = Chart(variable, positive or given.positive, given)
+    chart = Chart(variable, positive or given.positive, given)
     with opened(path, given.group) as data:
         for key, name in given.variables().items():
             require(
@@ -79,7 +80,7 @@ def read_bathymetry(
                 f"{path.name} holds no variable `{name}`, which `{key}` names; "
                 f"it holds: {listing(data.variables)}",
             )
-        return _read(path.name, data, frame, lon, lat, beyond, asked)
+        return _read(path.name, data, frame, lon, lat, beyond, chart)
 
 
 def _pick(name: str, data: Any, variable: str | None) -> Any:
@@ -159,15 +160,15 @@ def _places(name: str, data: Any, variable: Any, names: Names) -> tuple[tuple[st
     return dims, grid, np.arange(grid.shape[0]), np.arange(grid.shape[1])
 
 
-def _read(name: str, data: Any, frame: LocalFrame, lon: Range, lat: Range, beyond: float, asked: Chart) -> Bottom:
-    variable = _pick(name, data, asked.variable)
-    dims, grid, rows, columns = _places(name, data, variable, asked.names)
+def _read(name: str, data: Any, frame: LocalFrame, lon: Range, lat: Range, beyond: float, chart: Chart) -> Bottom:
+    variable = _pick(name, data, chart.variable)
+    dims, grid, rows, columns = _places(name, data, variable, chart.names)
     single = {dim: 0 for dim in map(str, variable.dims) if dim not in dims}
     require(
         all(variable.sizes[dim] == 1 for dim in single),
         f"`{variable.name}` in {name} has dimensions {', '.join(map(str, variable.dims))}: a bathymetry has two",
     )
-    units = asked.names.units or units_of(variable)
+    units = chart.names.units or units_of(variable)
     factor = in_metres(units)
     if factor is None:
         raise InputError(
@@ -181,7 +182,7 @@ def _read(name: str, data: Any, frame: LocalFrame, lon: Range, lat: Range, beyon
     values = np.asarray(variable.isel(picked).transpose(*dims).values, np.float64) * factor
     gone, marks = undeclared(values)
     values = np.where(gone, np.nan, values)
-    sense = _sense(name, variable, values[np.isfinite(values)], asked.positive)
+    sense = _sense(name, variable, values[np.isfinite(values)], chart.positive)
     height = np.nan_to_num(-values if sense == "down" else values, nan=0.0)
     description = f"{variable.name} of {name}, positive {sense}"
     if marks:

@@ -103,17 +103,20 @@ def _decoded(
     """Return the times in UTC and notes; None for a single time whose date is unknown."""
     import xarray
 
-    broken = f"the time `{variable.name}` in {at.name}"
+    subject = f"the time `{variable.name}` in {at.name}"
     units = units or _units(variable, names)
     if not SINCE.search(units):
         require(
             variable.size == 1,
-            f'{broken} has no unit such as "hours since 1950-01-01" (it has {units or "none"!r}), so '
+            f'{subject} has no unit such as "hours since 1950-01-01" (it has {units or "none"!r}), so '
             f"{variable.size} times are unknown: set `origin` in `names`, the date from which they count",
         )
         return None, (f"`{variable.name}` has no date",)
     raw = np.atleast_1d(np.asarray(variable.values))
-    require(raw.dtype.kind in "fiu" and bool(np.isfinite(raw).all()), f"{broken} has missing values")
+    require(
+        raw.dtype.kind in "fiu" and bool(np.isfinite(raw).all()),
+        f"{subject} has missing values; leave these times out",
+    )
     calendar = str(variable.attrs.get("calendar", "standard"))
     try:
         # decoded alone: other coordinates of the file may not be decodable
@@ -122,7 +125,8 @@ def _decoded(
     except Exception as error:
         # the libraries do not document what they raise for an impossible unit
         raise InputError(
-            f"{broken} cannot be read: units {units!r}, calendar {calendar!r} ({str(error).splitlines()[0]})"
+            f"{subject} cannot be read: units {units!r}, calendar {calendar!r} ({str(error).splitlines()[0]}); "
+            "mend them"
         ) from None
     notes: tuple[str, ...] = ()
     if values.dtype.kind == "O":
@@ -131,7 +135,9 @@ def _decoded(
             flat = [np.datetime64(moment.isoformat(), "us") for moment in values.ravel()]
             values = np.array(flat).reshape(values.shape)
         except ValueError:
-            raise InputError(f"{broken} has dates of the calendar {calendar!r} that do not exist") from None
+            raise InputError(
+                f"{subject} has dates of the calendar {calendar!r} that do not exist; mend the file"
+            ) from None
         notes = (f"times of the calendar {calendar!r} keep their dates",)
     return _rounded(values), notes
 

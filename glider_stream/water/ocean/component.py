@@ -172,7 +172,7 @@ class Component:
 
         Depth, faces and sigma are given by dimension and coordinate. Dimensions of one element are left out.
         """
-        clock = clock_of(self.at, self.variable, self._own_time(horizontal))
+        clock = clock_of(self.at, self.variable, self._time_axis(horizontal))
         axes: dict[str, tuple[str, str]] = {}
         single: list[str] = []
         choice = _Choice({}, ())
@@ -195,7 +195,7 @@ class Component:
         left_out = tuple(f"the dimension `{dim}` of one element is left out" for dim in single)
         return clock, axes, single, _Choice(choice.picked, (*left_out, *choice.description))
 
-    def _own_time(self, horizontal: tuple[str, str]) -> tuple[str, str] | None:
+    def _time_axis(self, horizontal: tuple[str, str]) -> tuple[str, str] | None:
         for dim in map(str, self.variable.dims):
             if dim not in horizontal:
                 hit = self.at.axis_of(self.variable, dim)
@@ -446,7 +446,7 @@ class Component:
         require(
             shape == (ny, nx),
             f"`{field.name}` in {self.file} has {shape[0]} x {shape[1]} points, `{self.name}` {ny} x {nx}: "
-            "they do not fit",
+            "they do not fit; give the grid file of the same model",
         )
         return values
 

@@ -152,12 +152,12 @@ def _seconds(file: OceanFile, epoch: str | np.datetime64 | None) -> tuple[slice,
     assert epoch is not None
     when = f"`flow.epoch` = {epoch.astype('datetime64[s]')}Z"
     within = bool(file.times[0] <= epoch <= file.times[-1])
-    require(within, f"{when} lies outside the times of {file.name}, {file.time_range}")
+    require(within, f"{when} lies outside the times of {file.name}, {file.time_range}; choose one of these")
     seconds = (file.times - epoch) / np.timedelta64(1, "s")
     run, gap = unbroken_times(file.times, epoch)
     require(
         bool(seconds[run.start] <= 0 <= seconds[run.stop - 1]) and run.stop - run.start > 1,
-        f"{when} lies in a gap of {file.name}: {gap}",
+        f"{when} lies in a gap of {file.name}: {gap}; choose another time",
     )
     first = min(int(np.searchsorted(seconds[: run.stop], 0, side="right")) - 1, run.stop - 2)
     return slice(first, run.stop), seconds[first : run.stop]
@@ -260,7 +260,10 @@ def _ocean_flow(
         "domain smaller",
     )
     open_somewhere = bool((seabed.bottom < -depth[0]).any())
-    require(open_somewhere, f"the domain holds no water in {file.name}: every column is land, or has no data")
+    require(
+        open_somewhere,
+        f"the domain holds no water in {file.name}: every column is land, or has no data; move the domain",
+    )
     return flow, seabed, grid
 
 

@@ -154,7 +154,7 @@ class LonLatGrid:
             if not (axis.size > 1 and axis[0] - slack <= bounds[0] and bounds[1] <= axis[-1] + slack):
                 raise OutsideError(
                     f"the domain's {what} {bounds[0]:g} to {bounds[1]:g} lies partly outside {name}, "
-                    f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{note}"
+                    f"which holds {axis[0]:.6g} to {axis[-1]:.6g}{note}; move or narrow the domain"
                 )
         across, within = span(lons, lon, margin), span(lats, lat, margin)
         rows = slice(within.start + run.start, within.stop + run.start)
@@ -269,11 +269,13 @@ class CurvedGrid:
         if not inside:
             raise OutsideError(
                 f"{domain} partly outside {name} or across its seam; it holds longitude {own_lon[0]:.6g} to "
-                f"{own_lon[1]:.6g}, latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows"
+                f"{own_lon[1]:.6g}, latitude {own_lat[0]:.6g} to {own_lat[1]:.6g} along curved rows; move or "
+                "narrow the domain"
             )
         if not self._open(at, (rows.start, across.start)).all():
             raise OutsideError(
-                f"{domain} across a gap between the rows or columns of {name}, where it holds no data"
+                f"{domain} across a gap between the rows or columns of {name}, where it holds no data; move or "
+                "narrow the domain"
             )
         return Cut(rows, np.arange(self.shape[1])[across], part)
 

@@ -89,7 +89,10 @@ def _projected(at: Catalogue, variable: Any) -> tuple[tuple[str, str], Any, Any]
         east, north = np.meshgrid(*flat)
         lon, lat = across.transform(east, north, errcheck=True)
     except (ProjError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"the grid mapping `{mapping}` in {at.name} is not understood: {error}") from None
+        raise InputError(
+            f"the grid mapping `{mapping}` in {at.name} is not understood: {error}; add a file with "
+            "two-dimensional longitudes"
+        ) from None
     rows = (str(y.dims[0]), str(x.dims[0]))
     made = [xarray.DataArray(part, dims=rows, name=name) for name, part in ((axes[0], lon), (axes[1], lat))]
     return rows, made[0], made[1]

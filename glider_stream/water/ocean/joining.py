@@ -72,7 +72,10 @@ def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
         require(len(matching) > 0, f"{name} holds no current toward {toward}; also name the file that does")
         both.append(_stacked(name, matching))
     east, north = both
-    require(_same(east.times, north.times), f"{name}: east and north currents are given at different times")
+    require(
+        _same(east.times, north.times),
+        f"{name}: east and north currents are given at different times; give both at the same times",
+    )
     moments = _stamped(name, east.times, names)
     levels = _levels_of_both(name, east, north)
     notes = list(dict.fromkeys(note for part in both for note in part.notes))
@@ -88,7 +91,9 @@ def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
     notes += found
     data = np.isfinite(u)
     wet, ever = np.asarray(data.all(axis=0)), np.asarray(data.any(axis=0))
-    require(bool(ever.any()), f"{name} holds no current at all: every value is missing or zero")
+    require(
+        bool(ever.any()), f"{name} holds no current at all: every value is missing or zero; give another file"
+    )
     if (gaps := int((ever & ~wet).sum())) > 0:
         notes.append(
             f"{100 * gaps / ever.sum():.1f} % of the wet points have gaps in time; plans keep out of these"

@@ -201,9 +201,9 @@ class Catalogue:
     def components(self) -> dict[str, tuple[str, str]]:
         """Return variable and reason for u and v, or for the one that the file holds, or an empty dictionary."""
         named = {c: str(getattr(self.names, c)) for c in "uv" if getattr(self.names, c) is not None}
-        here = {c: (name, "as you say") for c, name in named.items() if name in self.data.variables}
-        if len(named) == 2 or (named and not here):
-            return here
+        found_by_user = {c: (name, "as you say") for c, name in named.items() if name in self.data.variables}
+        if len(named) == 2 or (named and not found_by_user):
+            return found_by_user
         partial: dict[str, tuple[str, str]] = {}
         for how, pairs in (
             ("standard_name", STANDARD_NAMES),
@@ -211,7 +211,7 @@ class Catalogue:
             ("long_name", LONG_NAMES),
         ):
             for pair in pairs:
-                found = dict(here)
+                found = dict(found_by_user)
                 for component, key in zip("uv", pair, strict=True):
                     if component not in found and (hit := self._pick(how, key)) is not None:
                         found[component] = (hit, f"{how} {self._label(how, hit)}")
@@ -340,8 +340,8 @@ class Catalogue:
             for name in dict.fromkeys(same_name + others)
             if self.data[name].dims == (dim,) and (kind := self.kind(name)) is not None
         ]
-        asked = [hit for hit in hits if getattr(self.names, hit[0], None) == hit[1]]
-        return next(iter(asked or hits), None)
+        chosen = [hit for hit in hits if getattr(self.names, hit[0], None) == hit[1]]
+        return next(iter(chosen or hits), None)
 
     def scalar(self, variable: Any, kind: str) -> str | None:
         """Return the name of a coordinate of one value, or None; the height of a wind does not count."""
@@ -378,8 +378,8 @@ class Catalogue:
                 every = [wanted]
             every = [name for name in every if not ELSEWHERE.search(name)] or every
             listed = [name for name in every if name in self.coordinates(variable)]
-            here = [name for name in every if (AT_U if component == "u" else AT_V).search(name)]
-            hits = listed if len(listed) == 1 else here if len(here) == 1 else every
+            matching = [name for name in every if (AT_U if component == "u" else AT_V).search(name)]
+            hits = listed if len(listed) == 1 else matching if len(matching) == 1 else every
             elsewhere = [name for name in hits if wanted != name and name not in listed and OTHERS.match(name)]
             require(
                 not elsewhere,

@@ -85,7 +85,7 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
 
 def _damaged(path: Path, error: Exception) -> InputError:
     what = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return InputError(f"{path.name} cannot be read; it may be truncated or damaged: {what}")
+    return InputError(f"{path.name} cannot be read; it may be truncated or damaged ({what}): get it again")
 
 
 def _of_the_file(error: Exception) -> bool:

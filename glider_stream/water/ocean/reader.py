@@ -41,18 +41,10 @@ def read_currents(
     require(len(paths) > 0, "`flow.file` must name at least one current file; got none")
     given = names if isinstance(names, Names) else from_table(Names, names or {}, "names")
     domain = None if lon is None or lat is None else (lon, lat, depth or (0.0, 0.0))
+    with_currents = _with_currents(paths, given)
     parts: list[Part] = []
     with ExitStack() as stack:
         beside: list[Any] = []
-        held: dict[str, Sequence[str]] = {}
-        with_currents = []
-        for path in paths if len(paths) > 1 or given.variables() else []:
-            with opened(path, given.group) as data:
-                held[path.name] = list(map(str, data.variables))
-                if Catalogue(path.name, data, given).components():
-                    with_currents.append(path)
-        if held:
-            _check_names(held, given)
         if len(paths) > 1:
             grids = [path for path in paths if path not in with_currents]
             beside = [stack.enter_context(opened(path, given.group)) for path in grids]
@@ -64,6 +56,20 @@ def read_currents(
                 found = _parts(Catalogue(path.name, whole, given), domain, room, depth is None)
                 parts += [_dated(_grounded(part, beside, given), parts, given) for part in found]
     return joined(paths, parts, given)
+
+
+def _with_currents(paths: list[Path], names: Names) -> list[Path]:
+    """Return the files that hold currents, if there are several; InputError if no file holds a named variable."""
+    held: dict[str, Sequence[str]] = {}
+    found = []
+    for path in paths if len(paths) > 1 or names.variables() else []:
+        with opened(path, names.group) as data:
+            held[path.name] = list(map(str, data.variables))
+            if Catalogue(path.name, data, names).components():
+                found.append(path)
+    if held:
+        _check_names(held, names)
+    return found
 
 
 def _check_names(held: dict[str, Sequence[str]], names: Names) -> None:

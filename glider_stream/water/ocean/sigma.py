@@ -87,9 +87,9 @@ def _coordinate(data: Any, dim: str, variable: Any) -> Any | None:
 def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     """Return the terrain-following levels of a variable; InputError names what is missing."""
     coordinate = _coordinate(data, dim, variable)
-    broken = f"`{variable.name}` in {name} is on terrain-following levels `{dim}`"
+    subject = f"`{variable.name}` in {name} is on terrain-following levels `{dim}`"
     if coordinate is None:
-        raise InputError(f"{broken}, which have no values in this file; add the file that holds them")
+        raise InputError(f"{subject}, which have no values in this file; add the file that holds them")
     terms = dict(re.findall(r"(\w+)\s*:\s*(\S+)", str(coordinate.attrs.get("formula_terms", ""))))
 
     def term(key: str, *usual: str) -> Any | None:
@@ -109,11 +109,11 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     standard = standard_name(coordinate)
     h, zeta = term("depth", "h", "bathy", "depth"), term("eta", "zeta", "ssh", "zos")
     if h is None or h.ndim < 2:
-        raise InputError(f"{broken}, but the file holds no depth of the seabed `h`; add the grid file that does")
+        raise InputError(f"{subject}, but the file holds no depth of the seabed `h`; add the grid file that does")
     s = np.asarray(coordinate.values, np.float64)
     require(
         bool(((s >= -1 - SAME) & (s <= SAME)).all()),
-        f"{broken}, whose values are not all from -1 to 0; mend the file",
+        f"{subject}, whose values are not all from -1 to 0; mend the file",
     )
     description = f"{dim}: terrain-following levels over `{h.name}`"
     description += " under a level surface" if zeta is None else f" under `{zeta.name}`"
@@ -124,23 +124,28 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     if standard not in ("ocean_s_coordinate_g1", "ocean_s_coordinate_g2"):
         if standard and standard != "ocean_s_coordinate":
             raise InputError(
-                f"{broken} of the form {standard!r}, which is not known: interpolate them to fixed depths first"
+                f"{subject} of the form {standard!r}, which is not known: interpolate them to fixed depths first"
             )
         if transform not in (1.0, 2.0):
-            raise InputError(f"{broken}, but the file has no `Vtransform` of 1 or 2; add the grid file that does")
+            raise InputError(
+                f"{subject}, but the file has no `Vtransform` of 1 or 2; add the grid file that does"
+            )
         standard = f"ocean_s_coordinate_g{int(transform)}"
     require(
         transform in (None, float(standard[-1])),
-        f"{broken} of the form {standard!r}, but the file says `Vtransform` = {transform}: mend one of them",
+        f"{subject} of the form {standard!r}, but the file says `Vtransform` = {transform}: mend one of them",
     )
     stretch, critical = term("C", "Cs_r", "Cs_rho"), number("depth_c", "hc", "Tcline")
     stretch = _among_attributes(data, dim, variable, "Cs_r") if stretch is None else stretch
     lacks = [what for what, term_found in (("Cs_r", stretch), ("hc", critical)) if term_found is None]
-    require(not lacks, f"{broken}, but the file holds no {listing(lacks)}; add the grid file that does")
+    require(not lacks, f"{subject}, but the file holds no {listing(lacks)}; add the grid file that does")
     assert stretch is not None
     assert critical is not None
     c = np.asarray(stretch.values, np.float64)
-    require(c.shape == s.shape, f"{broken}, but `{stretch.name}` has {c.size} values for {s.size} levels")
+    require(
+        c.shape == s.shape,
+        f"{subject}, but `{stretch.name}` has {c.size} values for {s.size} levels; mend the file",
+    )
     low, high = _ends(name, variable, s, c)
     return SigmaLevels(
         standard[-2:], dim, s, c, critical, h, zeta, _with_range(description, low, high), low, high

@@ -1,0 +1,114 @@
+"""The roadmap of many departures: slices of edges over the same nodes."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Array, Index
+from ..base.settings import require
+from .roadmap import EDGE_FIELDS, Provenance, Roadmap
+
+
+def rows_of(nodes: Index, slices: int) -> Index:
+    """The rows of some nodes' edges: node n has the rows from n times `slices` on, one for each departure."""
+    return np.asarray((nodes[:, None] * slices + np.arange(slices)).ravel())
+
+
+@dataclass(frozen=True)
+class SlicedRoadmap:
+    """Nodes `position` (n, 3) [m]; edges at each of the `departures` (slices,) [s], rising.
+
+    As `Roadmap`, but `indptr` (n slices + 1,) has a row for each node and departure, as `rows_of` numbers
+    them, and `row_counts` (n slices, statuses) are the pairs of each.
+
+    Examples:
+        >>> departures = ["departures.first=0", "departures.last=600", "departures.every=600"]
+        >>> road = planner.build("swinging-gyre", overrides=["sampling.shape=[4, 3, 2]", *departures])
+        >>> road.departures.tolist(), len(road.at(1).position)
+        ([0.0, 600.0], 26)
+    """
+
+    departures: Array
+    position: Array
+    indptr: Index
+    target: NDArray[np.int32]
+    time: Array
+    cost: Array
+    glide_angle: Array
+    heading: Array
+    speed: Array
+    miss: Array
+    counts: dict[str, int]
+    provenance: Provenance
+    wall_s: float
+    threads: int
+    lonlat: Array | None = None
+    row_counts: NDArray[np.int32] | None = None
+    file: Path | None = field(default=None, compare=False)
+    elsewhere: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def evaluated(self) -> int:
+        """How many pairs were looked at."""
+        return sum(self.counts.values())
+
+    def at(self, number: int) -> Roadmap:
+        """One slice, as a roadmap of its own."""
+        slices, nodes = self.departures.size, len(self.position)
+        require(0 <= number < slices, f"slices have the numbers 0 to {slices - 1}; got {number}")
+        rows = np.arange(nodes) * slices + number
+        degree = np.diff(self.indptr)[rows]
+        indptr = np.concatenate([[0], np.cumsum(degree)])
+        edges = np.arange(indptr[-1]) + np.repeat(self.indptr[rows] - indptr[:-1], degree)
+        share = edges.size / max(self.target.size, 1)
+        counts = dict(self.counts)
+        if self.row_counts is not None:
+            counts = dict(zip(counts, self.row_counts[rows].sum(axis=0).tolist(), strict=True))
+        values: dict[str, Any] = {name: getattr(self, name)[edges] for name in EDGE_FIELDS}
+        return Roadmap(
+            position=self.position,
+            indptr=indptr,
+            target=self.target[edges],
+            counts=counts,
+            provenance=self.provenance,
+            wall_s=self.wall_s * (share if slices > 1 else 1.0),
+            threads=self.threads,
+            lonlat=self.lonlat,
+            node_counts=None if self.row_counts is None else self.row_counts[rows],
+            file=self.file,
+            elsewhere=self.elsewhere,
+            **values,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `info --json` says."""
+        return {
+            "nodes": len(self.position),
+            "departures": self.departures.tolist(),
+            "edges": self.target.size,
+            "evaluated": self.evaluated,
+            "connected_share": self.target.size / max(self.evaluated, 1),
+            "counts": self.counts,
+            "pairs_per_s": self.evaluated / max(self.wall_s, 1e-9),
+            "wall_s": self.wall_s,
+            "threads": self.threads,
+            **asdict(self.provenance),
+        }
+
+    def __str__(self) -> str:
+        others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
+        degree = np.diff(self.indptr).reshape(-1, self.departures.size).sum(axis=0)
+        return (
+            f"Roadmap: {len(self.position):,} nodes, {self.departures.size} departures from "
+            f"{self.departures[0]:,.0f} s to {self.departures[-1]:,.0f} s, {self.target.size:,} edges, "
+            f"{degree.min():,} to {degree.max():,} at a departure\n"
+            f"  pairs:  {self.evaluated:,} evaluated ({others})\n"
+            f"  flow:   {self.provenance.flow}\n"
+            f"  glider: {self.provenance.glider}\n"
+            f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.provenance.created}\n"
+            f"  by:     glider-stream {self.provenance.software_version}"
+            + "".join(f", {words}" for words in (self.provenance.libraries, self.provenance.machine) if words)
+        )

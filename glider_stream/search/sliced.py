@@ -1,0 +1,283 @@
+"""Searches over slices: leg times between departures, then each leg of the answer as it truly is.
+
+A search takes a leg's time as linear between the departures that a roadmap has. The legs of what it finds are
+then flown one after another, each found exactly at the time at which it truly leaves; what that teaches goes
+before the slices, and the search is made again, until it finds nothing better than a route that was flown.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..base.arrays import Array, Index
+from ..base.settings import require
+from ..kernels.control import CLIMB, DIVE, vertical_speed
+from ..kernels.edges import CONNECTED, STATUS, TIME, edge_of
+from ..kernels.timetable import earliest_arrivals
+from ..roadmap.pairs import Attached, NeighbourLegs
+from ..roadmap.problem import Problem
+from ..roadmap.provenance import check_unchanged
+from ..roadmap.slices import SlicedRoadmap
+from .path import Hop
+
+AGREES = 0.01
+"""Search and flight agree to so much [s]."""
+MOST_ROUNDS = 100
+BESIDE = 0.02
+"""What a leg gains by ending a little beside its target, as a share of it, at the most."""
+LAST_LEGS_AT_ONCE = 32
+"""Nodes from which a leg to a goal that is no node is looked for together."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far apart slices and truth were: of `legs` that were flown, the times [s] by the slices were off by
+    `most`, and by `mean` on average; `lost` legs of the slices do not exist when they should leave.
+
+    `rounds`: how many searches it took; `agreed`: whether the last one found nothing better than what was flown.
+    """
+
+    legs: int
+    most: float
+    mean: float
+    lost: int
+    rounds: int
+    agreed: bool
+
+    def __str__(self) -> str:
+        searches = "1 search" if self.rounds == 1 else f"{self.rounds} searches"
+        said = f"slices and truth differ by {self.most:.2g} s in a leg at most, {self.mean:.2g} s on average"
+        lost = f", and {self.lost} legs of the slices do not exist when they should leave" if self.lost else ""
+        end = "" if self.agreed else "; they did not come to agree, and a better route may exist"
+        return f"{said}, in {self.legs} legs of {searches}{lost}{end}"
+
+
+@dataclass
+class _Learnt:
+    """Exact legs between nodes at the departures at which they were looked for."""
+
+    rows: dict[tuple[int, int, float], Array] = field(default_factory=dict)
+    off: list[float] = field(default_factory=list)
+    lost: int = 0
+
+    def table(self, nodes: int) -> tuple[Index, Index, Array, Array]:
+        """As `earliest_arrivals` takes it."""
+        keys = sorted(self.rows)
+        source = np.array([key[0] for key in keys], np.int64)
+        target, when = np.array([key[1] for key in keys], np.int64), np.array([key[2] for key in keys])
+        times = [self.rows[key][TIME] if self.rows[key][STATUS] == CONNECTED else math.inf for key in keys]
+        return np.searchsorted(source, np.arange(nodes + 1)).astype(np.int64), target, when, np.array(times)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The way that a search has found: its nodes, when it arrives [s], and a last leg to a goal beside them."""
+
+    nodes: list[int]
+    arrives: float
+    last: Array | None = None
+
+
+class SliceSearch:
+    """Finds the fastest routes over a roadmap of slices, at any departure between its first and last."""
+
+    def __init__(self, roadmap: SlicedRoadmap, problem: Problem) -> None:
+        """InputError where flow, terrain or glider are not those that the roadmap was built with."""
+        check_unchanged(roadmap, problem)
+        self.roadmap, self.problem = roadmap, problem
+
+    def fastest(self, start: Array, goal: Array, departure: float) -> tuple[list[Hop] | None, Agreement]:
+        """The legs of the fastest route between two points (3,) [m], None where there is none, and how it agrees.
+
+        Points that are no nodes are attached by legs that are exact from the first.
+        """
+        first, last = self.roadmap.departures[[0, -1]]
+        require(
+            first <= departure <= last,
+            f"the roadmap's departures are from {first:g} s to {last:g} s; got {departure:g} s",
+        )
+        learnt = _Learnt()
+        one = _Query(self, start, goal, departure, learnt)
+        best: list[Hop] | None = one.direct()
+        arrives = math.inf if best is None else departure + best[0][2].time
+        rounds, agreed = 0, False
+        while rounds < MOST_ROUNDS and not agreed:
+            rounds += 1
+            found = one.search(arrives - AGREES)
+            agreed = found is None
+            if found is None:
+                break
+            hops, when = one.flown(found)
+            if hops is not None and when < arrives:
+                best, arrives = hops, when
+            agreed = arrives <= found.arrives + AGREES
+        off = learnt.off or [0.0]
+        return best, Agreement(len(learnt.off), max(off), sum(off) / len(off), learnt.lost, rounds, agreed)
+
+
+class _Query:
+    """One question: its ends, and what is known of the legs beside the slices."""
+
+    def __init__(self, search: SliceSearch, start: Array, goal: Array, departure: float, learnt: _Learnt) -> None:
+        self.roadmap, self.departure, self.learnt = search.roadmap, departure, learnt
+        self.start, self.goal = start, goal
+        self.problem = replace(search.problem, departure=departure)
+        position = self.roadmap.position
+        self.starts, self.goals = (np.flatnonzero((position == end).all(axis=1)) for end in (start, goal))
+        self.legs = self.problem.legs(position)
+        self.ends = self.problem.evaluator.flow.extent.t_hi
+        self.away = None if self.starts.size else _arriving(self.legs.away(start), self.ends - departure)
+        self.least = self._least(position)
+        self._last: dict[tuple[int, float], Array] = {}
+
+    def direct(self) -> list[Hop] | None:
+        """The leg from end to end, where one of them is no node: no slice has it."""
+        if self.starts.size and self.goals.size:
+            return None
+        row = self._exact(self.start, self.goal, self.departure)
+        return [(self.start, self.goal, edge_of(row))] if row[STATUS] == CONNECTED else None
+
+    def search(self, latest: float) -> _Found | None:
+        """The fastest way that arrives by `latest` [s], by the slices and what was learnt; None if none does."""
+        road = self.roadmap
+        nodes = len(road.position)
+        arrival, before = np.full(nodes, math.inf), np.full(nodes, -1, np.int64)
+        if self.away is None:
+            arrival[self.starts] = self.departure
+        else:
+            arrival[self.away.nodes] = self.departure + self.away.outcomes[:, TIME]
+        goal = int(self.goals[0]) if self.goals.size else -1
+        what = road.departures, road.indptr, road.target, road.time, *self.learnt.table(nodes)
+        latest = min(latest, self.ends)
+        earliest_arrivals(*what, goal, self.least, latest, arrival, before)
+        node, arrives, last = goal, math.inf, None
+        if goal >= 0:
+            arrives = float(arrival[goal])
+        else:
+            node, arrives, last = self._through(arrival, latest)
+        if not math.isfinite(arrives) or arrives > latest:
+            return None
+        way = [node]
+        while before[way[-1]] >= 0:
+            way.append(int(before[way[-1]]))
+        return _Found(way[::-1], arrives, last)
+
+    def flown(self, found: _Found) -> tuple[list[Hop] | None, float]:
+        """The way flown: each leg as it is at its true departure. None where one does not exist then."""
+        position, when = self.roadmap.position, self.departure
+        hops: list[Hop] = []
+        if self.away is not None:
+            row = self.away.outcomes[np.flatnonzero(self.away.nodes == found.nodes[0])[0]]
+            hops.append((self.start, position[found.nodes[0]], edge_of(row)))
+            when += float(row[TIME])
+        for a, b in zip(found.nodes, found.nodes[1:], strict=False):
+            key = a, b, when
+            if key not in self.learnt.rows:
+                self.learnt.rows[key] = self._exact(position[a], position[b], when)
+                self._compare(a, b, when)
+            row = self.learnt.rows[key]
+            if row[STATUS] != CONNECTED:
+                return None, math.inf
+            hops.append((position[a], position[b], edge_of(row)))
+            when += float(row[TIME])
+        if found.last is not None:
+            row = self._last_leg(found.nodes[-1], when)
+            if row[STATUS] != CONNECTED:
+                return None, math.inf
+            hops.append((position[found.nodes[-1]], self.goal, edge_of(row)))
+            when += float(row[TIME])
+        return hops, when
+
+    def _compare(self, a: int, b: int, when: float) -> None:
+        """Note how far the slices are off for a leg that is now known exactly."""
+        row = self.learnt.rows[a, b, when]
+        if row[STATUS] != CONNECTED:
+            self.learnt.lost += 1
+            return
+        road = self.roadmap
+        number = int(
+            np.clip(np.searchsorted(road.departures, when, side="right") - 1, 0, road.departures.size - 1)
+        )
+        times = [self._slice_time(a, b, k) for k in (number, min(number + 1, road.departures.size - 1))]
+        ends = road.departures[[number, min(number + 1, road.departures.size - 1)]]
+        known = [time for time in times if math.isfinite(time)]
+        by_slices = known[0] if len(known) == 1 else float(np.interp(when, ends, times))
+        self.learnt.off.append(abs(by_slices - float(row[TIME])))
+
+    def _slice_time(self, a: int, b: int, number: int) -> float:
+        road = self.roadmap
+        row = a * road.departures.size + number
+        first, last = road.indptr[row], road.indptr[row + 1]
+        at = first + int(np.searchsorted(road.target[first:last], b))
+        return float(road.time[at]) if at < last and road.target[at] == b else math.inf
+
+    def _exact(self, start: Array, goal: Array, when: float) -> Array:
+        """The leg between two points that leaves at a time [s], a row of `Edge`; none outlasts the flow."""
+        evaluator = self.problem.evaluator
+        row: Array = evaluator.connect(np.array([start, goal]), when, [0], [0, 1], [1])[0]
+        if row[STATUS] == CONNECTED and when + row[TIME] > self.ends:
+            row[STATUS] = math.nan
+        return row
+
+    def _last_leg(self, node: int, when: float) -> Array:
+        key = node, when
+        if key not in self._last:
+            self._last[key] = self._exact(self.roadmap.position[node], self.goal, when)
+        return self._last[key]
+
+    def _through(self, arrival: Array, latest: float) -> tuple[int, float, Array | None]:
+        """The node by which a goal that is none is reached first, by `latest`, when [s], and the leg from there.
+
+        Nodes are looked at by the soonest time at which they could arrive, until none can be sooner.
+        """
+        position = self.roadmap.position
+        nodes = np.flatnonzero(np.isfinite(arrival) & (position[:, 2] != self.goal[2]))
+        if isinstance(self.legs, NeighbourLegs):
+            nodes = np.intersect1d(nodes, self.legs.neighbourhood.of(self.goal))
+        soonest = arrival[nodes] + self.least[nodes]
+        order = np.argsort(soonest, kind="stable")
+        best, arrives, leg = -1, math.inf, None
+        for first in range(0, order.size, LAST_LEGS_AT_ONCE):
+            if soonest[order[first]] >= min(arrives, latest):
+                break
+            some = nodes[order[first : first + LAST_LEGS_AT_ONCE]]
+            for node, row in zip(some, self._last_legs(some, arrival[some]), strict=True):
+                if row[STATUS] == CONNECTED and arrival[node] + row[TIME] < arrives:
+                    best, arrives, leg = int(node), float(arrival[node] + row[TIME]), row
+        return best, arrives, leg
+
+    def _last_legs(self, nodes: Index, when: Array) -> list[Array]:
+        """The legs from some nodes to the goal, found together where they are not known."""
+        new = [n for n, at in zip(nodes, when, strict=True) if (int(n), float(at)) not in self._last]
+        if new:
+            times = dict(zip(nodes.tolist(), when.tolist(), strict=True))
+            points = np.vstack([self.roadmap.position[new], self.goal])
+            departs = np.array([*(times[int(n)] for n in new), 0.0])
+            count = len(new)
+            rows = self.problem.evaluator.connect(
+                points, departs, np.arange(count), np.arange(count + 1), np.full(count, count)
+            )
+            for n, row in zip(new, rows, strict=True):
+                if row[STATUS] == CONNECTED and times[int(n)] + row[TIME] > self.ends:
+                    row[STATUS] = math.nan
+                self._last[int(n), times[int(n)]] = row
+        return [self._last[int(n), float(at)] for n, at in zip(nodes, when, strict=True)]
+
+    def _least(self, points: Array) -> Array:
+        """A bound below what remains [s] from each point (n, 3) [m] to the goal, however many legs it takes."""
+        evaluator = self.problem.evaluator
+        if not evaluator.exact:  # each leg may end beside its target by as much as the tolerance
+            return np.zeros(len(points))
+        polar, flow = evaluator.polar, evaluator.flow
+        sink = max(float(vertical_speed(polar, way, polar.steepest[way])) for way in (DIVE, CLIMB))
+        away = np.hypot(*(points[:, :2] - self.goal[:2]).T)
+        across = away / (float(polar.best_horizontal.max()) + flow.extent.max_speed)
+        least = np.maximum(across, np.abs(points[:, 2] - self.goal[2]) / sink)
+        return np.asarray(np.ascontiguousarray((1.0 - BESIDE) * least))
+
+
+def _arriving(attached: Attached, most: float) -> Attached:
+    """Those that are connected, by legs of no more than `most` [s]."""
+    kept = (attached.outcomes[:, STATUS] == CONNECTED) & (attached.outcomes[:, TIME] <= most)
+    return Attached(attached.nodes[kept], attached.outcomes[kept])
