@@ -80,9 +80,9 @@ def find_edges(
     """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
 
     Each node is left at its `departure` (n,) [s], at the problem's if None; `wanted` says of some sources to
-    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the batches
-    change a bit of the result. The edges leave rows, as `slices.rows_of` numbers them: with one departure the
-    nodes.
+    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the
+    batches change a bit of the result. The edges leave rows, as `slices.rows_of` numbers them: with one
+    departure the nodes.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     legs = problem.legs(position)
