@@ -15,10 +15,10 @@ SAMPLED = 400
 """Nodes that are looked at, evenly by their numbers."""
 AROUND = 8
 """Nodes nearby, whose distance says how far nodes lie apart."""
-WIDEST = 1.0
-"""Nodes further apart, in legs, lose routes more than 5 % (the table in docs/steering.md)."""
-FEWEST = 12.0
-"""With fewer directions a route zigzags."""
+WIDEST = 1.15
+"""Nodes further apart, in legs, cost routes 7 % or more of their time (the table in docs/steering.md)."""
+FEWEST = 9.0
+"""Fewer directions than a lattice's eight, and one more: a route runs along them, and its fronts have corners."""
 
 
 @dataclass(frozen=True)
