@@ -102,7 +102,7 @@ class OpenedScenario:
         return self._once(rule, RoutePlanner, lambda: planner_of(self.problem, self._roadmap, rule))  # type: ignore[type-abstract]
 
     def _leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
-        """`planner` for routes that leave at a time, the scenario's departure if None."""
+        """Return the `planner` for routes that leave at a time; None stands for the scenario's departure."""
         problem, road = self.problem, self._roadmap
         since = 0.0 if depart is None else seconds(depart, problem, "depart") - problem.departure
         changes = not is_steady(problem.evaluator.flow)
@@ -115,7 +115,7 @@ class OpenedScenario:
         return planner_of(problem.leaving(since), road, self._surfacing if surfacing is None else surfacing)
 
     def _problem_of(self, route: Path) -> Problem:
-        """The problem at the time at which a route leaves, where it says that."""
+        """Return the problem at the time when a route leaves, if the route has one."""
         problem = self.problem
         return problem if route.departure is None else problem.leaving(route.departure - problem.departure)
 
@@ -223,7 +223,7 @@ class OpenedScenario:
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
     def arrivals(self, start: Point | None = None, *, depart: Moment | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s from departure]; inf where not.
+        """Return the earliest time [s from departure] at which each node (n,) can be reached; inf if it cannot.
 
         Gliders leave at `depart`, as in `query`.
 
@@ -377,7 +377,7 @@ class OpenedScenario:
             assert road is not None
             if isinstance(
                 road, SlicedRoadmap
-            ):  # the slice nearest to the departure, over the current of its time
+            ):  # draw the slice nearest to the departure, over the current of its time
                 number = int(np.abs(road.departures - problem.departure).argmin())
                 problem = problem.leaving(float(road.departures[number]) - problem.departure)
                 which = f"slice {number + 1} of {road.departures.size}"

@@ -9,6 +9,9 @@ from ..base.arrays import Array, Bools, Index
 from ..kernels.edges import EDGE_COLUMNS, STATUS, TIME, Status
 from ..roadmap.problem import Problem
 
+MOST_REMEMBERED = 512
+"""Fans that a bounded expansion remembers, with some thousand legs each."""
+
 
 class Fan(NamedTuple):
     """Legs that leave one place at one time: to the places `target` (n,), rising; rows of `Edge` (n, 7)."""
@@ -33,6 +36,11 @@ class Expansion(Protocol):
     @property
     def start(self) -> int:
         """The place of the start."""
+        ...
+
+    @property
+    def spent(self) -> bool:
+        """Whether it shall be asked no more: a search then ends where it is."""
         ...
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
@@ -96,6 +104,11 @@ class ClockExpansion:
             for n, nodes in enumerate(self.ends.goal_nodes)
         ]
 
+    @property
+    def spent(self) -> bool:
+        """As Expansion says: never."""
+        return False
+
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
         """As Expansion says."""
         nodes, flow = len(self.position), self.problem.evaluator.flow
@@ -137,6 +150,54 @@ class ClockExpansion:
         for n in map(int, np.flatnonzero(ask.any(axis=1))):
             here, new = result[n], slice(indptr[n], indptr[n + 1])
             result[n] = Fan(np.concatenate([here.target, goals[to[new]]]), np.concatenate([here.rows, rows[new]]))
+
+
+class BoundedExpansion:
+    """A clock's expansion that is `spent` after `most` fans; it remembers the first for another search."""
+
+    def __init__(self, clock: ClockExpansion, most: float) -> None:
+        """Nothing is remembered yet."""
+        self.clock, self.most, self.found = clock, most, 0
+        self.known: dict[tuple[int, float], tuple[Bools, Fan]] = {}
+
+    @property
+    def places(self) -> Array:
+        """As Expansion says."""
+        return self.clock.places
+
+    @property
+    def nodes(self) -> int:
+        """As Expansion says."""
+        return self.clock.nodes
+
+    @property
+    def start(self) -> int:
+        """As Expansion says."""
+        return self.clock.start
+
+    @property
+    def spent(self) -> bool:
+        """As Expansion says."""
+        return self.found >= self.most
+
+    def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
+        """As Expansion says."""
+        asked = zip(place.tolist(), time.tolist(), wanted, strict=True)
+        fans = [self._remembered(at, when, some) for at, when, some in asked]
+        new = np.array([n for n, fan in enumerate(fans) if fan is None], np.int64)
+        if new.size:
+            found = self.clock.fans(place[new], time[new], wanted[new])
+            self.found += new.size
+            for n, fan in zip(new, found, strict=True):
+                fans[n] = fan
+                if len(self.known) < MOST_REMEMBERED:
+                    self.known[int(place[n]), float(time[n])] = wanted[n], fan
+        return [fan for fan in fans if fan is not None]
+
+    def _remembered(self, place: int, time: float, wanted: Bools) -> Fan | None:
+        """The fan of a place and a time, where it has at least the legs that are wanted."""
+        had, fan = self.known.get((place, time), (None, None))
+        return None if had is None or bool((wanted & ~had).any()) else fan
 
 
 def _kept(fan: Fan, departure: float, last: float) -> Fan:

@@ -33,7 +33,8 @@ class Aim:
     """What a search is for: the least time, or with `by_cost` the least cost; a cost below `cost_below`.
 
     With `front`, every way to the goal that no other beats in both. `bins` [s]: labels of different bins are
-    kept side by side; `latest` [s]: no label is later.
+    kept side by side; `latest` [s]: no label is later. `below`: ways that take as much, of what is made least
+    (the time at which they arrive, or the cost), are of no use.
     """
 
     by_cost: bool = False
@@ -41,6 +42,7 @@ class Aim:
     front: bool = False
     bins: float | None = None
     latest: float = math.inf
+    below: float = math.inf
 
 
 class Bound(Protocol):
@@ -89,7 +91,10 @@ class Label:
 
 
 class LabelSearch:
-    """A search over the legs of an expansion, from its start; `labels` holds all that were kept, by number."""
+    """A search over the legs of an expansion, from its start; `labels` holds all that were kept, by number.
+
+    `whole`: it did not end because the expansion was spent.
+    """
 
     def __init__(
         self,
@@ -110,6 +115,7 @@ class LabelSearch:
         self.inflection = cost.inflection(places[:, 2])
         self.per_second, self.per_leg = cost.kernel()
         self.priced = self.inflection is not None and (aim.by_cost or aim.front or math.isfinite(aim.cost_below))
+        self.by_cost = aim.by_cost and self.priced
         self.left = self.cost_left = np.zeros(len(places))
         if goals.size:
             self.left, self.cost_left = bound.remaining(goals, cost)
@@ -124,7 +130,8 @@ class LabelSearch:
         self.fans: dict[int, Fan] = {}
         self.expanded = np.zeros(len(places), bool)
         self.tally = Tally()
-        self.below = math.inf
+        self.whole = True
+        self.below = aim.below
         self.cost_below = aim.cost_below
         self.began = departure
         first = Label(expansion.start, departure, 0.0, True, 0, departure)
@@ -144,6 +151,9 @@ class LabelSearch:
                     continue
                 self.cost_below = label.cost
             yield number
+            if final and number not in self.fans and self.expansion.spent:
+                self.whole = False
+                return
             if final and (label.place < self.expansion.nodes or label.place == self.expansion.start):
                 self._relax(number, self._fan(number))
 
@@ -159,8 +169,7 @@ class LabelSearch:
         return found[::-1]
 
     def _key(self, label: Label) -> float:
-        by_cost = self.aim.by_cost and self.priced
-        so_far, left = (label.cost, self.cost_left) if by_cost else (label.time, self.left)
+        so_far, left = (label.cost, self.cost_left) if self.by_cost else (label.time, self.left)
         return so_far + float(left[label.place])
 
     def _criteria(
@@ -185,8 +194,7 @@ class LabelSearch:
         least = self.bound.between(label.place)
         time, cost = label.time + least, label.cost + self.per_leg + self.per_second * least
         wanted = (self.height != self.height[label.place]) & (time <= self.aim.latest)
-        by_cost = self.aim.by_cost and self.priced
-        wanted &= (cost + self.cost_left if by_cost else time + self.left) < self.below
+        wanted &= (cost + self.cost_left if self.by_cost else time + self.left) < self.below
         if self.priced:
             wanted &= cost + self.cost_left < self.cost_below
         if self.aim.bins is None:
@@ -249,8 +257,7 @@ class LabelSearch:
             fits &= half < 2 * self.rule.most_yos
         if self.rule.most_hours is not None:
             fits &= time - label.surfaced <= HOUR * self.rule.most_hours
-        by_cost = self.aim.by_cost and self.priced
-        fits &= (cost + self.cost_left[to] if by_cost else time + self.left[to]) < self.below
+        fits &= (cost + self.cost_left[to] if self.by_cost else time + self.left[to]) < self.below
         if self.priced:
             fits &= cost + self.cost_left[to] < self.cost_below
         half, surfaced = np.where(self.up[to], 0, half), np.where(self.up[to], time, label.surfaced)

@@ -66,4 +66,5 @@ class SlicePlanner(ClockPlanner):
         first, last = self.slices.roadmap.departures[[0, -1]]
         slices = f"the roadmap's slices are from {first:g} s to {last:g} s"
         note = f"{slices}, and {why}: its legs were found without them"
-        return replace(super()._query(start, goal, aim), notes=(note,))
+        path = super()._query(start, goal, aim)
+        return replace(path, notes=(note, *path.notes))

@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
 from ..base.clock import moment
 from ..base.settings import require
 from ..kernels.edges import TIME
 from ..roadmap.problem import Problem
 from ..roadmap.step_error import step_error
 from .assembly import RoutePlanner, nodes_at, placed_end
-from .expansion import ClockExpansion, Ends
+from .expansion import BoundedExpansion, ClockExpansion, Ends, Expansion
 from .labels import Aim, LabelSearch
 from .least_time import GreatestSpeeds, LeastTimes
 from .path import Hop, Path
@@ -28,6 +28,12 @@ from .why_not import why_not
 
 MOST_BINS, FEWER_BINS = 240, 48
 """How many bins of time after departure a search with bins looks at; and one that was not asked to use them."""
+LATER_FANS = 256
+"""Fans of a second look, for a better path: enough for all ways where nodes are few."""
+NARROWEST = 8.0
+"""Bins are not halved below so many seconds: two ways that arrive so soon after each other go on alike."""
+BETTER = 1e-3
+"""A later way must be better by so much [s or J]: what is found twice, in other batches, is no gain."""
 
 
 class ClockPlanner(RoutePlanner):
@@ -74,20 +80,49 @@ class ClockPlanner(RoutePlanner):
         if np.array_equal(ends.start, ends.goals[0]):
             return self.assembly.path(ends.start, ends.goals[0], [])
         path, search = self._first(ends, self._with_bins(aim))
-        if path.found:
-            return path
         if self.problem.bins is not None:
-            return self._first(ends, aim)[0]
-        # a glider that cannot hold its place comes back to a node later, and only then finds a way on
+            return path if path.found else self._first(ends, aim)[0]
+        return self._looked_again(ends, aim, path, search)
+
+    def _looked_again(self, ends: Ends, aim: Aim, path: Path, search: LabelSearch) -> Path:
+        """The best of a path and of ways that come to some node later than at the soonest; what was looked at.
+
+        Bins begin as long as the legs and are halved, until `LATER_FANS` are spent. Where no path is known, all
+        ways in the first bins are followed: a glider that cannot hold its place comes back later, and only then
+        finds a way on.
+        """
         durations = [float(label.row[TIME]) for label in search.labels if label.row is not None]
         if not durations or not self.assembly.changes or self.assembly.frozen:
             return path
-        bins = float(np.median(durations))
-        latest = self.problem.departure + FEWER_BINS * bins
-        again, _ = self._first(ends, replace(aim, bins=bins, latest=latest))
-        until = moment(self.problem.departs, FEWER_BINS * bins)
-        looked = f"ways that come back to a node later were followed until {until}, in bins of {bins:,.0f} s"
-        return again if again.found else replace(path, why=f"{path.why}; {looked}")
+        widest, departure = float(np.median(durations)), self.problem.departure
+        latest = departure + FEWER_BINS * widest
+        expansion = BoundedExpansion(self._expansion(ends), LATER_FANS if path.found else math.inf)
+        best, width, finest, whole = path, widest, math.inf, True
+        while whole and width >= NARROWEST:
+            below = (best.cost if search.by_cost else departure + best.travel_time) - BETTER
+            later = replace(aim, bins=width, latest=latest, below=below)
+            # why there is no path tell the widest bins, whose ways are the most that were all followed
+            found, again = self._first(ends, later, expansion, known=best.found or width < widest)
+            best = found if found.found or (width == widest and not best.found) else best
+            whole, expansion.most = again.whole, max(LATER_FANS, expansion.found)
+            finest = width if whole else finest
+            width /= 2
+        if not best.found:
+            until = moment(self.problem.departs, latest - departure)
+            looked = f"ways that come back to a node later were followed until {until}"
+            return replace(best, why=f"{best.why}; {looked}, in bins of {finest:,.0f} s")
+        return best if whole else replace(best, notes=(*best.notes, self._in_part(again, finest)))
+
+    def _in_part(self, search: LabelSearch, finest: float) -> str:
+        """What is not known of a path, where ways that come to a node later were not all followed."""
+        start = search.expansion.start
+        least = float((search.cost_left if search.by_cost else search.left)[start])
+        bound = f"{least:,.0f} J" if search.by_cost else f"{least:,.0f} s"
+        how = "in part" if math.isinf(finest) else f"in bins of {finest:,.0f} s"
+        return (
+            f"ways that come to a node later than at the soonest were followed {how}; a better one may exist, "
+            f"none takes less than {bound}; set query.bins (seconds) to follow all of them, which takes longer"
+        )
 
     def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
         """The cheapest paths from a point (3,) [m] to each of many, by one search."""
@@ -129,7 +164,8 @@ class ClockPlanner(RoutePlanner):
         search, expansion = self._search(ends, self._with_bins(Aim(front=True)))
         found: list[int | None] = [n for n in search.settled() if search.is_goal[search.labels[n].place]]
         paths = [self._path(search, expansion, number, ends, 0) for number in found or [None]]
-        return TradeOff(tuple(paths))
+        exact = self.problem.bins is not None or not self.assembly.changes or self.assembly.frozen
+        return TradeOff(tuple(paths), whole=exact)
 
     def _ends(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> Ends:
         """Where the ends of a query are, checked."""
@@ -147,13 +183,19 @@ class ClockPlanner(RoutePlanner):
         bins = self.problem.bins
         return aim if bins is None else replace(aim, bins=bins, latest=self.problem.departure + MOST_BINS * bins)
 
+    def _expansion(self, ends: Ends) -> ClockExpansion:
+        return ClockExpansion(self.problem, self.position, ends, self.assembly.frozen)
+
     def _search(self, ends: Ends, aim: Aim, to_all: bool = False) -> tuple[LabelSearch, ClockExpansion]:
-        departure = self.problem.departure
-        expansion = ClockExpansion(self.problem, self.position, ends, self.assembly.frozen)
+        expansion = self._expansion(ends)
         goals = np.empty(0, np.int64) if to_all else expansion.goals[0]
+        return self._search_of(expansion, goals, aim), expansion
+
+    def _search_of(self, expansion: Expansion, goals: Index, aim: Aim) -> LabelSearch:
+        departure = self.problem.departure
         least = LeastTimes(self._speeds_now(), expansion.places)
         cost = self.problem.evaluator.cost
-        return LabelSearch(expansion, cost, self.rule, least, goals, departure, aim), expansion
+        return LabelSearch(expansion, cost, self.rule, least, goals, departure, aim)
 
     def _speeds_now(self) -> GreatestSpeeds:
         """The greatest speeds from the departure on; those from an earlier time on bound them, too."""
@@ -163,11 +205,16 @@ class ClockPlanner(RoutePlanner):
             self._speeds[since] = GreatestSpeeds(self.problem, self.position, since)
         return self._speeds[since]
 
-    def _first(self, ends: Ends, aim: Aim) -> tuple[Path, LabelSearch]:
-        """The path of the first label that settles at the goal."""
-        search, expansion = self._search(ends, aim)
-        settled = (number for number in search.settled() if search.is_goal[search.labels[number].place])
-        return self._path(search, expansion, next(settled, None), ends, 0), search
+    def _first(
+        self, ends: Ends, aim: Aim, bounded: BoundedExpansion | None = None, known: bool = False
+    ) -> tuple[Path, LabelSearch]:
+        """The path of the first label that settles at the goal; not why there is none where one is `known`."""
+        clock = self._expansion(ends) if bounded is None else bounded.clock
+        search = self._search_of(bounded or clock, clock.goals[0], aim)
+        number = next((n for n in search.settled() if search.is_goal[search.labels[n].place]), None)
+        if number is None and known:
+            return self.assembly.no_path(ends.start, ends.goals[0]), search
+        return self._path(search, clock, number, ends, 0), search
 
     def _path(
         self,

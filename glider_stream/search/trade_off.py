@@ -17,16 +17,23 @@ from .expansion import Fan
 from .path import FROZEN, Path
 
 NO_LEGS = Fan(np.empty(0, np.int64), np.empty((0, EDGE_COLUMNS)))
+WHOLE = "the whole front: no path is better than one of these in both"
+IN_PART = (
+    "no path among those that come to each node soonest, or for less energy, is better than one of these in "
+    "both; set query.bins (seconds) to follow later ones, too"
+)
 
 
 @dataclass(frozen=True)
 class TradeOff:
     """`paths` by rising time and falling energy: all that there are of which no other is better in both.
 
-    One path that is not found where there is none.
+    One path that is not found where there is none. Not `whole`: in a flow that changes, ways that come to a node
+    later, and for no less energy, were not followed; one of them may go on better.
     """
 
     paths: tuple[Path, ...]
+    whole: bool = True
 
     def within(self, energy: float) -> Path:
         """The fastest of them that uses at most so much energy [J]; where there is none, why."""
@@ -37,7 +44,11 @@ class TradeOff:
         """For JSON: each path's time, energy and number of legs."""
         rows = [(path.travel_time, path.cost, len(path.legs)) for path in self.paths]
         still = {} if self.paths[0].departure is None else {"frozen": self.paths[0].frozen}
-        return {"trade_off": [{"travel_time_s": t, "energy_j": e, "legs": n} for t, e, n in rows], **still}
+        return {
+            "trade_off": [{"travel_time_s": t, "energy_j": e, "legs": n} for t, e, n in rows],
+            "whole": self.whole,
+            **still,
+        }
 
     def __str__(self) -> str:
         lines = ["   time                energy   legs"]
@@ -45,7 +56,8 @@ class TradeOff:
             f"{span(path.travel_time):>20} {path.cost / 1000:9,.2f} kJ  {len(path.legs):4}" for path in self.paths
         ]
         still = [FROZEN] if self.paths[0].frozen else []
-        return "\n".join([*lines, "the whole front: no path is better than one of these in both", *still])
+        last = WHOLE if self.whole else IN_PART
+        return "\n".join([*lines, last, *still])
 
 
 def none_within(least: Path, energy: float) -> Path:
@@ -88,6 +100,11 @@ class RoadmapExpansion:
     def goals(self) -> Index:
         """The places of the goal."""
         return self.ends.goal_nodes if self.ends.goal_legs is None else np.array([self.nodes])
+
+    @property
+    def spent(self) -> bool:
+        """As Expansion says: never."""
+        return False
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
         """As Expansion says: all of them, at any time."""
