@@ -114,7 +114,7 @@ def test_new_nodes_lie_only_where_a_route_may_be_as_quick(problem):
     road = build_roadmap(replace(problem, sampler=GridSampler((12, 12, 2))))
     searcher = Planner(road, problem)
     refiner = Refiner(searcher, problem.start, problem.goal)
-    cloud = refiner._first()
+    cloud, _ = refiner._first()
     # the sums are exact: at the start, at the goal, and along the best route they are what it costs
     best = searcher.query()
     np.testing.assert_allclose(cloud.sums()[refiner._stops(cloud, best)], best.cost)
