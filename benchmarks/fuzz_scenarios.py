@@ -34,6 +34,8 @@ from glider_stream.water.inspect import is_steady
 
 verify.LEGS_AT_ONCE = 500  # a step costs the same for one leg and for many
 COMMON = 60
+MEMORY = Path("/dev/shm")
+"""Files are made here where the system has it: a disk that must keep each of them is slow."""
 GOALS = 6
 """Goals that are asked for in each roadmap, from one start."""
 
@@ -228,7 +230,7 @@ def graph_of(problem, road):
 def tried(number):
     """A line of the log."""
     began = time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
         try:
             fault, edges = broken(number, Path(folder))
         except InputError as error:

@@ -44,8 +44,11 @@ def scenario_text(seed: int) -> str:
     return to_toml(table)
 
 
-def compared(name: str, road: Any) -> dict[str, Any]:
-    """A route as it is found, and polished: travel time [s], legs, seconds that it took, the worst end [m]."""
+def compared(name: str, road: Any, within: float | None) -> dict[str, Any]:
+    """A route as it is found, and polished: travel time [s], legs, seconds that it took, the worst end [m].
+
+    Refined and polished too, where `within` says until when.
+    """
     before = road.query()
     road.query(polish=True)  # compiles
     begun = time.perf_counter()
@@ -58,6 +61,16 @@ def compared(name: str, road: Any) -> dict[str, Any]:
     here = np.arange(len(after.legs))
     rows = [[n.duration, n.cost, n.glide_angle, n.heading, n.speed, n.miss] for n in after.legs]
     off = replayed_misses(road.problem.evaluator, road.problem.departure, stops, here, here + 1, np.array(rows))
+    refined: dict[str, Any] = {}
+    if within is not None:
+        begun = time.perf_counter()
+        best = road.query(polish=True, within=within)
+        refined = {
+            "refined_s": round(best.travel_time, 1),
+            "refined_legs": len(best.legs),
+            "rounds": len(best.rounds),
+            "refined_wall_s": round(time.perf_counter() - begun, 1),
+        }
     return {
         "route": name,
         "found_s": round(before.travel_time, 1),
@@ -66,23 +79,25 @@ def compared(name: str, road: Any) -> dict[str, Any]:
         "polished_legs": len(after.legs),
         "wall_s": round(took, 2),
         "worst_end_m": round(float(off.max()), 4),
+        **refined,
     }
 
 
-def routes(ionian: Path | None) -> Iterator[dict[str, Any]]:
+def routes(ionian: Path | None, within: float | None) -> Iterator[dict[str, Any]]:
     """All routes, the fields' with their references."""
     references = json.loads((RECORDS / "level_set_fields.json").read_text())["fields"]
     for seed in range(SEEDS):
         scenario = scenario_from_text(scenario_text(seed))
         road = glider_stream.open(build_roadmap(scenario.problem(), None, lambda progress: None))
-        row = compared(f"field {seed}", road)
+        row = compared(f"field {seed}", road, within)
         finest = references[str(seed)]["finest_s"]
-        over = {name: round(100 * (row[f"{name}_s"] / finest - 1), 2) for name in ("found", "polished")}
+        names = ("found", "polished", "refined") if within is not None else ("found", "polished")
+        over = {name: round(100 * (row[f"{name}_s"] / finest - 1), 2) for name in names}
         yield row | {"level_set_s": finest, "over_percent": over}
     if ionian is not None:
         scenario = read_scenario("ionian", [f"flow.file={ionian}"])
         yield compared(
-            "ionian", glider_stream.open(build_roadmap(scenario.problem(), None, lambda progress: None))
+            "ionian", glider_stream.open(build_roadmap(scenario.problem(), None, lambda progress: None)), within
         )
 
 
@@ -91,6 +106,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the fields' scenarios instead")
     parser.add_argument("--ionian", type=Path, metavar="CURRENTS.nc", help="the shipped Ionian scenario, too")
+    parser.add_argument("--within", type=float, metavar="SHARE", help="refine too, until a round gains less")
     parser.add_argument("-o", "--output", type=Path, help="a JSON file to keep the result in")
     args = parser.parse_args()
     if args.write:
@@ -100,7 +116,7 @@ def main() -> None:
         return
     rows = []
     with threads(None) as count:
-        for row in routes(args.ionian):
+        for row in routes(args.ionian, args.within):
             rows.append(row)
             print(row, file=sys.stderr, flush=True)
     machine = f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"

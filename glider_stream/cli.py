@@ -46,6 +46,22 @@ def key_and_value(text: str) -> tuple[str, Any]:
     return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
+class Percentage(click.ParamType[float]):
+    """A percentage such as 1%, as a share."""
+
+    name = "percentage"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The share."""
+        number = str(value).strip().removesuffix("%")
+        try:
+            if number != str(value).strip():
+                return float(number) / 100
+        except ValueError:
+            pass
+        self.fail(f"{value!r} is not a percentage, such as 1%", param, ctx)
+
+
 def _write_json(value: Any) -> None:
     say(json.dumps(value, indent=1))
 
@@ -122,7 +138,8 @@ def build(
             done = f"part {shard} of a roadmap"
         else:
             road = planner.build(scenario, output, progress=progress, **run)
-            done, empty = str(road), planner.why_no_edges(road)
+            dense = planner.density(road)
+            done, empty = f"{road}\n  dense:  {dense}", planner.why_no_edges(road) or dense.warning
     say(f"{done}\n  file:   {output}")
     if empty:
         say(f"note: {empty}", error=True)
@@ -174,6 +191,15 @@ ROUTE_OPTIONS = (
         "--polish",
         is_flag=True,
         help="Move the stops off the nodes, cut legs, count yos anew, as long as the cost falls.",
+    ),
+    click.option(
+        "--within",
+        type=Percentage(),
+        metavar="PERCENT",
+        help="Add nodes where they can help, in rounds, until a round gains less than this, such as 1%.",
+    ),
+    click.option(
+        "--seconds", type=float, metavar="SECONDS", help="Add nodes, as long as another round fits this time."
     ),
     click.option(
         "--thin",
@@ -258,15 +284,15 @@ def _check_together(front: bool, departures: bool, alone: bool, spacing: bool) -
     """
     if front and (departures or not alone):
         raise click.UsageError(
-            "--trade-off cannot be used with --output, --most-energy, --polish, --thin, --card, "
-            "--window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one of them "
-            "out"
+            "--trade-off cannot be used with --output, --most-energy, --polish, --within, --seconds, --thin, "
+            "--card, --window-hours, --waypoints, --arrival-radius, --depart-between and --arrive-by; leave one "
+            "of them out"
         )
     if departures and not alone:
         raise click.UsageError(
-            "--depart-between and --arrive-by cannot be used with --output, --most-energy, --polish, --thin, "
-            "--card, --window-hours, --waypoints and --arrival-radius; set query.departure to the departure that "
-            "they find"
+            "--depart-between and --arrive-by cannot be used with --output, --most-energy, --polish, --within, "
+            "--seconds, --thin, --card, --window-hours, --waypoints and --arrival-radius; set query.departure to "
+            "the departure that they find"
         )
     if spacing and not departures:
         raise click.UsageError("--every and --figure need --depart-between or --arrive-by; add one of them")
@@ -283,6 +309,8 @@ def _answer(
     most_yos: int | None,
     most_hours: float | None,
     polish: bool,
+    within: float | None,
+    seconds: float | None,
     thin: float | None,
     as_card: bool,
     window_hours: float | None,
@@ -296,7 +324,7 @@ def _answer(
     as_json: bool,
 ) -> None:
     """Print the answer of a roadmap or a scenario; exit code 1 if no path exists."""
-    from .pilot.export import check_export
+    from .opened import split_outputs
     from .search.surfacing import Surfacing
 
     free = most_yos is None and most_hours is None
@@ -305,7 +333,8 @@ def _answer(
     answer: Any
     given = {"window_hours": window_hours, "most_waypoints": waypoints, "arrival_radius": arrival_radius}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    alone = not (outputs or polish or options or as_card) and most_energy is None and thin is None
+    refines = within is not None or seconds is not None
+    alone = not (outputs or polish or refines or options or as_card) and most_energy is None and thin is None
     spacing = every is not None or figure is not None
     _check_together(front, departures, alone, spacing)
     if departures and depart is not None:
@@ -318,10 +347,10 @@ def _answer(
         answer = opened().when_to_leave(depart_between, every=every, arrive_by=arrive_by, figure=figure, **ends)
         found = answer.found
     else:
-        for output in outputs:
-            check_export(output)
+        split_outputs(outputs, refines)
         source = opened()
         options |= {"most_energy": most_energy, "polish": polish, "thin": thin, "surfacing": rule}
+        options |= {"within": within, "seconds": seconds, "progress": lambda line: say(line, error=True)}
         path = source.query(start, goal, depart=depart, outputs=outputs, **options)
         for note in path.notes:
             say(f"note: {note}", error=True)
@@ -506,6 +535,33 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
         say("\n".join(map(str, looked)))
     if any(result.faults for result in looked):
         sys.exit(1)
+
+
+@cli.command()
+@click.argument("scenario")
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@click.option("--nodes", type=int, help="Nodes along the longest side of the finer grid; 101 in 2-D, 61 in 3-D.")
+@click.option(
+    "--dimensions", type=int, help="2: the mean current of a yo's depths; 3: all depths; 2 for long routes."
+)
+@JSON
+def bound(
+    scenario: str, overrides: tuple[str, ...], nodes: int | None, dimensions: int | None, as_json: bool
+) -> None:
+    """Find the least time that a route of SCENARIO can take, by a level set, with its error."""
+    from . import planner
+
+    found = planner.bound(
+        scenario,
+        overrides=overrides,
+        nodes=nodes,
+        dimensions=dimensions,
+        progress=lambda line: say(f"bound: {line}", error=True),
+    )
+    if as_json:
+        _write_json(found.as_dict())
+    else:
+        say(found)
 
 
 @cli.command()

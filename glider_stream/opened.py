@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from .base.arrays import Array
+from .base.output import check_output
 from .base.settings import require
 from .pilot.card import Card
 from .pilot.card import card as card_of
@@ -19,6 +20,7 @@ from .pilot.score import score as score_of
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import node_positions
+from .roadmap.density import Density, density_of
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.slices import SlicedRoadmap
@@ -27,10 +29,13 @@ from .scenario import Scenario, read_scenario, scenario_of, shipped_scenarios
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
+from .search.least_time import GreatestSpeeds, least_cost
 from .search.path import Path, load_path
+from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .search.why_not import no_edges
+from .vehicle.polar import polar
 from .water.domain import GeographicDomain, Point
 from .water.inspect import is_steady
 
@@ -38,6 +43,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+
+
+def split_outputs(outputs: Sequence[str | File], refines: bool) -> tuple[list[str | File], list[str | File]]:
+    """The route files of a query's outputs, and the roadmap files; checked before anything is done."""
+    roadmaps = [output for output in outputs if File(output).suffix == ".h5"]
+    cure = "add --within or --seconds, or leave it out"
+    require(
+        refines or not roadmaps, f"a query writes a roadmap only where it refines; got {roadmaps[:1]}; {cure}"
+    )
+    routes = [output for output in outputs if output not in roadmaps]
+    for output in routes:
+        check_export(output)
+    for output in roadmaps:
+        check_output(output)
+    return routes, roadmaps
 
 
 class OpenedScenario:
@@ -82,7 +102,7 @@ class OpenedScenario:
         return self._once(rule, RoutePlanner, lambda: planner_of(self.problem, self._roadmap, rule))  # type: ignore[type-abstract]
 
     def _leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
-        """`planner` for routes that leave at a time, the scenario's departure if None."""
+        """Return the `planner` for routes that leave at a time; None stands for the scenario's departure."""
         problem, road = self.problem, self._roadmap
         since = 0.0 if depart is None else seconds(depart, problem, "depart") - problem.departure
         changes = not is_steady(problem.evaluator.flow)
@@ -95,7 +115,7 @@ class OpenedScenario:
         return planner_of(problem.leaving(since), road, self._surfacing if surfacing is None else surfacing)
 
     def _problem_of(self, route: Path) -> Problem:
-        """The problem at the time at which a route leaves, where it says that."""
+        """Return the problem at the time when a route leaves, if the route has one."""
         problem = self.problem
         return problem if route.departure is None else problem.leaving(route.departure - problem.departure)
 
@@ -123,8 +143,11 @@ class OpenedScenario:
         outputs: Sequence[str | File] = (),
         most_energy: float | None = None,
         polish: bool = False,
+        within: float | None = None,
+        seconds: float | None = None,
         thin: float | None = None,
         surfacing: Surfacing | None = None,
+        progress: Callable[[str], None] = lambda line: None,
         window_hours: float = HOURS,
         most_waypoints: int = MOST_WAYPOINTS,
         arrival_radius: float | None = None,
@@ -133,21 +156,41 @@ class OpenedScenario:
 
         `depart`: the departure, in seconds of the flow or an ISO 8601 text (UTC); None stands for the scenario's.
         `most_energy` [J]: take the fastest of the paths of `trade_off` that uses no more. `polish`: move the
-        stops off the nodes, cut legs and count yos anew, as long as the cost falls. `thin` [m]: join legs whose
-        stops lie this near to a straight line, if one glide can do it and no other rule is broken. `surfacing`: a
-        rule for how often to come up; None stands for the scenario's own. Exported windows last `window_hours`, a
-        goto list holds `most_waypoints`, and a waypoint counts as reached within `arrival_radius` [m]; None
-        stands for each vehicle's usual value. The path's `notes` tell what else happened to files.
+        stops off the nodes, cut legs and count yos anew, as long as the cost falls. `within`: add nodes where
+        they can help, in rounds, until a round gains less than this share of the cost, 0.01 for 1 %. `seconds`:
+        add them, as long as another round likely fits this time. `progress` is told of each round. An output
+        that ends in .h5 is the roadmap with the new nodes. `thin` [m]: join legs whose stops lie this near to a
+        straight line, if one glide can do it and no other rule is broken. `surfacing`: a rule for how often to
+        come up; None stands for the scenario's own. Exported windows last `window_hours`, a goto list holds
+        `most_waypoints`, and a waypoint counts as reached within `arrival_radius` [m]; None stands for each
+        vehicle's usual value. The path's `notes` tell what else happened to files.
 
         Examples:
             >>> path = road.query((-190, 190, 0), (100, -100, -75), thin=20)
             >>> len(path.legs), round(path.travel_time)
             (3, 430)
         """
-        for output in outputs:
-            check_export(output)
+        asked = None if within is None and seconds is None else Asked(within, seconds)
+        outputs, roadmaps = split_outputs(outputs, asked is not None)
         planner, ends = self._leaving(depart, surfacing), self._ends(start, goal)
-        path = best_path(planner, ends, most_energy=most_energy, polish=polish, thinned=thin)
+
+        def refine(path: Path, polish: Callable[[Path], Path] | None) -> Path:
+            assert asked is not None
+            found = refined(planner, ends, path, asked, polish, progress)
+            for file in roadmaps:
+                found.write(file)
+            return found.path
+
+        path = best_path(
+            planner,
+            ends,
+            most_energy=most_energy,
+            polish=polish,
+            refine=None if asked is None else refine,
+            thinned=thin,
+        )
+        if path.found and path.legs:
+            path = replace(path, least=self._least(path, planner.problem.departure))
         check_legs(path, outputs)
         notes: list[str] = []
         written = {
@@ -158,6 +201,14 @@ class OpenedScenario:
         for output in outputs:
             export_path(path, output, notes.append, **written)
         return replace(path, notes=(*path.notes, *notes))
+
+    def _least(self, path: Path, departure: float) -> float:
+        """A bound below the cost of every route between a path's ends that leaves at a departure [s]."""
+        problem = self.problem
+        speeds = self._once(
+            ("speeds", departure), GreatestSpeeds, lambda: GreatestSpeeds(problem, self.position, departure)
+        )
+        return least_cost(speeds, path.start, path.goal, problem.evaluator.cost)
 
     def table(self, starts: Sequence[Point], goals: Sequence[Point], *, depart: Moment | None = None) -> Array:
         """Return the costs of the cheapest paths from n points to m others: (n, m), inf where no path exists.
@@ -172,7 +223,7 @@ class OpenedScenario:
         return free.table([self._point(start) for start in starts], [self._point(goal) for goal in goals])
 
     def arrivals(self, start: Point | None = None, *, depart: Moment | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s from departure]; inf where not.
+        """Return the earliest time [s from departure] at which each node (n,) can be reached; inf if it cannot.
 
         Gliders leave at `depart`, as in `query`.
 
@@ -326,7 +377,7 @@ class OpenedScenario:
             assert road is not None
             if isinstance(
                 road, SlicedRoadmap
-            ):  # the slice nearest to the departure, over the current of its time
+            ):  # draw the slice nearest to the departure, over the current of its time
                 number = int(np.abs(road.departures - problem.departure).argmin())
                 problem = problem.leaving(float(road.departures[number]) - problem.departure)
                 which = f"slice {number + 1} of {road.departures.size}"
@@ -408,6 +459,16 @@ class OpenedRoadmap(OpenedScenario):
             return ""
         one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
         return no_edges(one, self.problem)
+
+    def density(self) -> Density:
+        """Return how far nodes lie apart in the vehicle's legs, and in how many directions legs leave them.
+
+        Examples:
+            >>> print(road.density())
+            nodes 87 m apart at a depth, 0.41 legs; legs in 12 of 36 directions from a node
+        """
+        one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
+        return density_of(one, float(polar(self.scenario.glider).best_angle.max()))
 
     def __str__(self) -> str:
         return str(self.roadmap)

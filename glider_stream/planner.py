@@ -10,10 +10,9 @@ from .base.output import check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
-from .opened import OpenedRoadmap, open_either, open_scenario
+from .opened import OpenedRoadmap, open_either, open_scenario, split_outputs
 from .opened import open as open_roadmap
 from .pilot.card import Card
-from .pilot.export import check_export
 from .pilot.lint import Linted
 from .pilot.lint import lint as lint_file
 from .pilot.score import Score
@@ -21,6 +20,7 @@ from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import Progress, build_roadmap, build_slices, node_positions
 from .roadmap.compare import Difference, difference
+from .roadmap.density import Density
 from .roadmap.provenance import check_unchanged
 from .roadmap.roadmap import Roadmap
 from .roadmap.slices import SlicedRoadmap
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .evaluation import bench as benchmarks
+    from .evaluation.level_set import Bound
     from .evaluation.suite import Report
     from .roadmap.verify import Verification
     from .vehicle.calibration.result import Calibration
@@ -199,6 +200,8 @@ def query(
     most_waypoints: int = MOST_WAYPOINTS,
     arrival_radius: float | None = None,
     polish: bool = False,
+    within: float | None = None,
+    seconds: float | None = None,
     depart: Moment | None = None,
 ) -> Path:
     """Return the cheapest path between two points; see `OpenedRoadmap.query`.
@@ -210,8 +213,7 @@ def query(
         >>> len(path.legs), round(path.travel_time)
         (3, 430)
     """
-    for output in outputs:
-        check_export(output)  # before the roadmap is read
+    split_outputs(outputs, within is not None or seconds is not None)  # before the roadmap is read
     return open_roadmap(roadmap).query(
         start,
         goal,
@@ -219,6 +221,8 @@ def query(
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
+        within=within,
+        seconds=seconds,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
@@ -239,6 +243,8 @@ def plan(
     *,
     overrides: Sequence[str] = (),
     polish: bool = False,
+    within: float | None = None,
+    seconds: float | None = None,
     depart: Moment | None = None,
 ) -> Path:
     """Return the cheapest path of a scenario, without a roadmap; see `OpenedRoadmap.query`.
@@ -248,8 +254,7 @@ def plan(
         >>> path.found
         True
     """
-    for output in outputs:
-        check_export(output)
+    split_outputs(outputs, within is not None or seconds is not None)
     return open_scenario(scenario, overrides).query(
         start,
         goal,
@@ -257,6 +262,8 @@ def plan(
         outputs=outputs,
         most_energy=most_energy,
         polish=polish,
+        within=within,
+        seconds=seconds,
         thin=thin,
         surfacing=surfacing,
         window_hours=window_hours,
@@ -327,6 +334,16 @@ def why_no_edges(roadmap: AnyRoadmap) -> str:
     return open_roadmap(roadmap).why_no_edges()
 
 
+def density(roadmap: AnyRoadmap) -> Density:
+    """Return how far a roadmap's nodes lie apart in legs, and in how many directions legs leave them.
+
+    Examples:
+        >>> planner.density("small.h5").warning
+        ''
+    """
+    return open_roadmap(roadmap).density()
+
+
 def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":
     """Fly the legs of a roadmap file again, and a `sample` of them (0: all) by another integrator.
 
@@ -339,6 +356,30 @@ def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] =
     from .roadmap.verify import verify
 
     return verify(roadmap, lambda road: open_roadmap(road, overrides).problem, sample)
+
+
+def bound(
+    scenario: str | File | Scenario,
+    *,
+    overrides: Sequence[str] = (),
+    nodes: int | None = None,
+    dimensions: int | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> "Bound":
+    """Find the least time that a route of a scenario can take, by a level set, with its error.
+
+    `nodes` along the longest side of the finer grid; in 2 `dimensions`, the mean current of a yo's depths, or 3;
+    None chooses 2 for long routes.
+
+    Examples:
+        >>> bound = planner.bound("small.toml", nodes=21)
+        >>> bound.dimensions, bound.least < 486
+        (3, True)
+    """
+    from .evaluation.level_set import bound
+
+    resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
+    return bound(resolved.problem(), dimensions, nodes, progress)
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:

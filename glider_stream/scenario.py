@@ -95,7 +95,7 @@ class QueryPoints:
 
 @dataclass(frozen=True)
 class Departures:
-    """The departures of a roadmap's slices [s]: the `first`, one `every` so many seconds after it, the `last`."""
+    """The departures of a roadmap's slices [s]: from `first` to `last`, one `every` so many seconds."""
 
     first: float
     last: float
@@ -118,7 +118,7 @@ class Departures:
         )
 
     def times(self) -> tuple[float, ...]:
-        """All of them, rising."""
+        """Return all departures, rising."""
         steps = math.floor((self.last - self.first) / self.every * (1 + 1e-12))
         times = [min(self.first + n * self.every, self.last) for n in range(steps + 1)]
         return tuple(times) if times[-1] == self.last else (*times, self.last)
@@ -199,7 +199,7 @@ class Scenario:
         return "the departures of their slices" if several else f"departure at {self.departure:g} s"
 
     def _slices(self, flow: Flow) -> tuple[float, ...]:
-        """The departures of the roadmap's slices [s]; none where the scenario has no [departures]."""
+        """The departures of the roadmap's slices [s]; empty without a section [departures]."""
         if self.departures is None:
             return ()
         first, last, known = self.departures.first, self.departures.last, flow.extent

@@ -53,6 +53,7 @@ def road(place):
         "describe pipe.nc",
         "describe store.zarr",
         "score road.h5 pipe.csv",
+        "lint pipe.ma",
         "calibrate pipe.csv",
         "bench --quick --against pipe.json",
     ],

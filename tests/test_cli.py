@@ -53,7 +53,7 @@ def test_query_finds_a_path(file, tmp_path, capsys):
     said = command(capsys, "query", file, "-o", path, "-o", tmp_path / "again.JSON")
     assert (said.code, said.err) == (0, "")
     assert said.out.startswith("path from (-190, 190, 0) to (160, -160, 0): 4 legs, ")
-    assert said.out.count("\n") == 5
+    assert said.out.count("\n") == 6
     assert strict_json(path.read_text())["found"] is True
     assert (tmp_path / "again.JSON").read_text() == path.read_text()
 

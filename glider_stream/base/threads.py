@@ -30,7 +30,7 @@ def threads(count: int | None) -> Iterator[int]:
 
 
 def thread_count() -> int:
-    """How many threads kernels run on here."""
+    """Return the number of threads that kernels use here."""
     return _COUNT.get() or usable_cores()
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.untrusted import check_file
 from .seaglider import target_faults
 from .slocum_files import MOST_WAYPOINTS, goto_faults, read_mission_file, yo_faults
 
@@ -36,8 +37,10 @@ def lint(file: str | File, most_waypoints: int = MOST_WAYPOINTS) -> Linted:
     """Check a goto list (of at most `most_waypoints`), a yo file or `targets`; InputError for other files."""
     require(most_waypoints >= 1, f"a goto list must hold 1 waypoint or more; got {most_waypoints}")
     path = File(file)
+    check_file(path, "the file")
     try:
-        content = path.read_bytes()[: MOST_TEXT + 1]
+        with path.open("rb") as stream:
+            content = stream.read(MOST_TEXT + 1)
     except OSError as error:
         raise InputError(f"the file {path} cannot be read: {(error.strerror or 'error').lower()}") from None
     require(

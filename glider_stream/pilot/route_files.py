@@ -11,6 +11,7 @@ from xml.etree import ElementTree as Xml
 
 from ..base.errors import InputError
 from ..base.settings import require
+from ..base.untrusted import check_file
 from .route_columns import HEIGHTS, NotARoute, column_of, csv_points, depth_of, refuse_unknown, stated_height
 from .route_maps import OURS, Mark, gpx_points, kml_points, route_of
 from .seaglider import target_points
@@ -53,6 +54,7 @@ def read_drawn(file: str | Path) -> Drawn:
     if the file has another form.
     """
     path = Path(file)
+    check_file(path, "the route")
     require(path.is_file(), f"the route {path} does not exist; name a file")
     form = "targets" if path.name.lower() == "targets" else path.suffix.lower()
     known, got = ", ".join(FORMS), repr(form or "no ending")

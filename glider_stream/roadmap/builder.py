@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import thread_count as threads_now
 from ..base.threads import threads
@@ -19,7 +19,7 @@ from .follow import Follower
 from .pairs import Found, Legs
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
-from .roadmap import EDGE_FIELDS, Edges, Roadmap, in_order
+from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 from .slices import SlicedRoadmap, rows_of
 from .step_error import StepSample
 
@@ -70,12 +70,19 @@ def warm_up(problem: Problem) -> None:
 
 
 def find_edges(
-    problem: Problem, position: Array, source: Index | None = None, batch_pairs: int = BATCH_PAIRS
+    problem: Problem,
+    position: Array,
+    source: Index | None = None,
+    batch_pairs: int = BATCH_PAIRS,
+    departure: Array | None = None,
+    wanted: Callable[[Index], Bools] | None = None,
 ) -> Iterator[Edges]:
     """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
 
-    Neither the number of threads nor the batches change a bit of the result. The edges leave rows, as
-    `slices.rows_of` numbers them: with one departure the nodes.
+    Each node is left at its `departure` (n,) [s], at the problem's if None; `wanted` says of some sources to
+    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the
+    batches change a bit of the result. The edges leave rows, as `slices.rows_of` numbers them: with one
+    departure the nodes.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     legs = problem.legs(position)
@@ -84,7 +91,11 @@ def find_edges(
     follower = Follower.of(problem, position) if len(problem.departures) > 1 else None
     for first in range(0, len(source), size):
         some = source[first : first + size]
-        yield _evaluated(legs, some) if follower is None else _followed(follower, some)
+        if follower is not None:
+            yield _followed(follower, some)
+            continue
+        when = None if departure is None else departure[some]
+        yield _evaluated(legs, some, when, None if wanted is None else wanted(some))
 
 
 def nodes_of_batch(problem: Problem, legs: Legs, batch_pairs: int) -> int:
@@ -93,9 +104,10 @@ def nodes_of_batch(problem: Problem, legs: Legs, batch_pairs: int) -> int:
     return max(nodes // slices, min(nodes, SPANS * NODES_AT_ONCE * threads_now()))
 
 
-def _evaluated(legs: Legs, source: Index) -> Edges:
+def _evaluated(legs: Legs, source: Index, departure: Array | None, wanted: Bools | None) -> Edges:
     began = time.perf_counter()
-    return _edges(source, legs.of(source), time.perf_counter() - began)
+    batch = legs.of(source, departure, wanted)
+    return _edges(source, batch, time.perf_counter() - began)
 
 
 def _followed(follower: Follower, source: Index) -> Edges:
@@ -180,18 +192,26 @@ def build_slices(
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
             parts.append(edges)
             progress(tally.add(edges))
-    whole = in_order(parts)
-    values: dict[str, Any] = {n: np.ascontiguousarray(whole.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
+    return _slices_of(problem, position, in_order(parts), made, tally)
+
+
+def _slices_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> SlicedRoadmap:
+    values: dict[str, Any] = {n: np.ascontiguousarray(edges.values[:, k]) for k, n in enumerate(EDGE_FIELDS)}
     return SlicedRoadmap(
         departures=np.array(problem.departures),
         position=position,
-        indptr=np.concatenate([[0], np.cumsum(whole.degree)]),
-        target=whole.target,
+        indptr=np.concatenate([[0], np.cumsum(edges.degree)]),
+        target=edges.target,
         provenance=made,
         lonlat=lonlat_of(problem, position),
         counts=tally.by_name(),
         wall_s=tally.seconds,
-        threads=used,
-        row_counts=whole.counts,
+        threads=tally.threads,
+        row_counts=edges.counts,
         **values,
     )
+
+
+def roadmap_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> Roadmap:
+    """A roadmap of nodes (n, 3) [m] and the edges of all of them, at the problem's one departure."""
+    return _slices_of(problem, position, edges, made, tally).at(0)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,22 @@ MOST_NODES = 10_000_000
 """A roadmap with more nodes does not fit into memory."""
 MOST_DRAWN = 4 * MOST_NODES
 """Points that are drawn in search of open water, at most: they are held at once."""
+
+
+def cells_along(lo: Array, hi: Array, spacing: Array) -> list[int]:
+    """How many even cells, about `spacing` (d,) wide, fill a box lo..hi (d,) along each axis."""
+    return [max(1, round(float(wide / step))) for wide, step in zip(hi - lo, spacing, strict=True)]
+
+
+def jittered(lo: Array, hi: Array, spacing: Array, random: np.random.Generator | None) -> Array:
+    """Points (n, d), one anywhere in each of the even cells, about `spacing` (d,) wide, of a box lo..hi (d,).
+
+    Unlike those of a lattice they lie in all directions from each other. In the middles if `random` is None.
+    """
+    counts = cells_along(lo, hi, spacing)
+    cells = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, len(counts))
+    within = 0.5 if random is None else random.random(cells.shape)
+    return np.asarray(lo + (cells + within) / counts * (hi - lo))
 
 
 class Sampler(Protocol):
@@ -114,17 +130,20 @@ class HaltonSampler(RandomSampler):
 
 @dataclass(frozen=True)
 class YoSampler:
-    """Nodes at the `depths` [m] that yos turn at, even in x and y: every `spacing` [m], or `per_leg` to a leg.
+    """Nodes at the `depths` [m] that yos turn at: one every `spacing` [m] in x and y, or `per_leg` to a leg.
 
-    A leg's length is that of the fastest glide between the depths furthest apart, dz / tan(gamma).
+    A leg's length is that of the fastest glide between the depths furthest apart, dz / tan(gamma). With `jitter`
+    a node lies anywhere in its cell, by `seed`, so that legs lead in all directions; else in the middle.
     """
 
     depths: tuple[float, ...]
     spacing: float | None = None
     per_leg: float | None = None
-    seed = 0
+    jitter: bool = True
+    seed: int = 0
 
     def __post_init__(self) -> None:
+        require(self.seed >= 0, f"`sampling.seed` must be at least 0; got {self.seed}")
         fits = len(self.depths) >= 2 and self.depths[0] >= 0 and bool((np.diff(self.depths) > 0).all())
         require(fits, f"`sampling.depths` must be two or more, rising from 0 m or below; got {list(self.depths)}")
         given = [value for value in (self.spacing, self.per_leg) if value is not None]
@@ -136,20 +155,21 @@ class YoSampler:
         if self.per_leg is None:
             return self
         leg = float(np.diff(self.depths).max()) / math.tan(angle)
-        return YoSampler(self.depths, spacing=leg / self.per_leg)
+        return replace(self, spacing=leg / self.per_leg, per_leg=None)
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """Points (n, 3) [m] in the box lo..hi: x varies slowest, z fastest, from the shallowest down."""
+        """Points (n, 3) [m] in the box lo..hi, depth by depth from the shallowest down."""
         assert self.spacing is not None
         deepest, most = max(self.depths), -float(lo[2])
         require(deepest <= most, f"`sampling.depths` reach {deepest:g} m, the domain {most:g} m; deepen it")
-        counts = [max(1, int((hi[n] - lo[n]) / self.spacing)) for n in range(2)]
-        size = counts[0] * counts[1] * len(self.depths)
+        lo, hi = lo[:2], hi[:2]
+        spacing = np.full(2, self.spacing)
+        size = math.prod(cells_along(lo, hi, spacing)) * len(self.depths)
         fits = size <= MOST_NODES
         require(fits, f"nodes every {self.spacing:g} m would be {size:,}, more than {MOST_NODES:,}; take fewer")
-        x, y = (lo[n] + (np.arange(k) + 0.5) / k * (hi[n] - lo[n]) for n, k in enumerate(counts))
-        points = np.stack(np.meshgrid(x, y, -np.array(self.depths), indexing="ij"), axis=-1).reshape(-1, 3)
-        points = points + 0.0  # no depth of -0
+        random = np.random.default_rng(self.seed) if self.jitter else None
+        layers = [(jittered(lo, hi, spacing, random), 0.0 - depth) for depth in self.depths]
+        points = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for flat, z in layers])
         return np.asarray(points[allowed(points)])
 
 

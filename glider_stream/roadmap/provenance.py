@@ -4,6 +4,7 @@ import hashlib
 import platform
 import tomllib
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,6 +19,9 @@ from .inputs import inputs_of, names_of
 from .problem import Problem
 from .roadmap import Provenance, Roadmap
 from .slices import SlicedRoadmap
+
+_version = cache(version)
+"""Versions of packages, which are read from files."""
 
 
 def lonlat_of(problem: Problem, position: Array) -> Array | None:
@@ -40,10 +44,10 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
         kernel_digest=KERNEL_DIGEST,
         seed=problem.sampler.seed,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
-        software_version=version("glider-stream"),
+        software_version=_version("glider-stream"),
         cost_unit=problem.evaluator.cost.unit,
         inputs=inputs_of(names, (folder or Path()).absolute()),
-        libraries=", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
+        libraries=", ".join(f"{name} {_version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
         machine=f"{platform.node()}, {platform.machine()}, Python {platform.python_version()}",
     )
 

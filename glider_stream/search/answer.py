@@ -1,5 +1,6 @@
 """What a query may ask beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs, a polish."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,8 @@ SAME = 1e-6
 """Departures [s] that lie no further apart are one: sums of times round."""
 Ends = tuple[Array | None, Array | None]
 """Start and goal (3,) [m]; None for the scenario's own."""
+Refinement = Callable[[Path, Callable[[Path], Path] | None], Path]
+"""Refines a path; each round's routes go through the second, if there is one."""
 
 
 def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing) -> RoutePlanner:
@@ -66,15 +69,19 @@ def best_path(
     *,
     most_energy: float | None = None,
     polish: bool = False,
+    refine: Refinement | None = None,
     thinned: float | None = None,
 ) -> Path:
     """The cheapest path; within `most_energy` [J] the fastest; with `thinned` [m] of fewer legs, where they hold.
 
-    With `polish` its stops are moved until nothing near costs less. InputError where `most_energy` is asked of a
-    roadmap that has no energies, or with `polish`.
+    With `polish` its stops are moved until nothing near costs less; `refine` adds nodes where they can help.
+    InputError where `most_energy` is asked of a roadmap that has no energies, or with either of these.
     """
-    both = polish and most_energy is not None
-    require(not both, "a route within a bound on energy is not polished: that makes its cost less, not its time")
+    for asked, done in ((polish, "polished"), (refine is not None, "refined")):
+        both = asked and most_energy is not None
+        require(
+            not both, f"a route within a bound on energy is not {done}: that makes its cost less, not its time"
+        )
     if most_energy is None:
         path = planner.query(*ends)
     else:
@@ -82,7 +89,10 @@ def best_path(
         _check_energy(planner)
         path = planner.within(*ends, most_energy)
     notes = path.notes
-    path = polished(path, planner) if polish else path
+    if refine is not None:
+        path = refine(path, (lambda one: polished(one, planner)) if polish else None)
+    elif polish:
+        path = polished(path, planner)
     path = path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
     return replace(path, notes=notes)
 
@@ -126,5 +136,6 @@ def polished(path: Path, planner: RoutePlanner) -> Path:
     chain = polisher.chain_of(path)
     if chain is None:
         return kept
-    better = replace(planner.fly(polisher.hops(improve(polisher, chain))), unpolished=kept.unpolished)
+    better = planner.fly(polisher.hops(improve(polisher, chain)))
+    better = replace(better, unpolished=kept.unpolished, expanded=path.expanded, rounds=path.rounds)
     return better if better.cost < path.cost and rule.holds(better) else kept

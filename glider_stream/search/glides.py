@@ -46,13 +46,14 @@ class Glides(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """What a leg's time and glide angle change by: `time` (n, 7) [s] and `angle` (n, 7) [rad].
+    """What a leg's time and control change by: `time` (n, 7) [s], glide `angle` and `heading` (n, 7) [rad].
 
     By start x, y, z, end x, y, z [m] and departure [s].
     """
 
     time: Array
     angle: Array
+    heading: Array
 
 
 @dataclass(frozen=True)
@@ -88,25 +89,45 @@ class Air:
             angle, heading = np.clip(angle + turn[:, 0], lowest, highest), heading + turn[:, 1]
         return Glides(angle, heading, time, np.asarray(left), miss)
 
-    def slopes(self, begin: Array, end: Array, glides: Glides) -> Slopes:
-        """The derivatives of exact legs, by flights beside them and the implicit function theorem."""
+    def slopes(self, begin: Array, end: Array, glides: Glides, one_sided: bool = False) -> Slopes:
+        """The derivatives of exact legs, by flights beside them and the implicit function theorem.
+
+        With `one_sided` by half the flights, and off by half a step: enough where two of them are compared.
+        """
         climbs = end[:, 2] > begin[:, 2]
         of = np.column_stack([begin, glides.departs, end[:, 2], glides.angle, glides.heading])
-        beside = [of + sign * _step(n) for n in range(7) for sign in (1.0, -1.0)]
-        ends = self._ends(np.stack(beside), climbs)
-        by = (ends[0::2] - ends[1::2]) / (2 * STEPS[:, None, None])  # (7, n, 2)
+        if one_sided:
+            ends = self._ends(np.stack([of, *(of + _step(n) for n in range(7))]), climbs)
+            by = (ends[1:] - ends[0]) / STEPS[:, None, None]
+        else:
+            beside = [of + sign * _step(n) for n in range(7) for sign in (1.0, -1.0)]
+            ends = self._ends(np.stack(beside), climbs)
+            by = (ends[0::2] - ends[1::2]) / (2 * STEPS[:, None, None])  # (7, n, 2)
         # a leg ends at its stop: what moves its end otherwise, the control takes back
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
-        angle = np.stack([_solve(by[ANGLE], by[HEADING], off)[:, 0] for off in moved], axis=1)
+        control = np.stack([_solve(by[ANGLE], by[HEADING], off) for off in moved], axis=1)
+        angle = control[..., 0]
         sinks = self.sinking(glides.angle, climbs)
         ahead, behind = (self.sinking(glides.angle + sign * STEPS[ANGLE], climbs) for sign in (1.0, -1.0))
         change = (ahead - behind) / (2 * STEPS[ANGLE])
         time = -(glides.time * change / sinks)[:, None] * angle
         time[:, 2] -= 1 / sinks
         time[:, 5] += 1 / sinks
-        return Slopes(time, angle)
+        return Slopes(time, angle, control[..., 1])
+
+    def aimed(self, begin: Array, end: Array, glides: Glides, slopes: Slopes, moved: Array) -> Glides:
+        """Legs to ends that have `moved` (n, 6) [m], to first order: guesses, which end near their stops."""
+        climbs = end[:, 2] > begin[:, 2]
+        lowest, highest = self.angles(climbs)
+        angle = glides.angle + (slopes.angle[:, :6] * moved).sum(axis=1)
+        heading = glides.heading + (slopes.heading[:, :6] * moved).sum(axis=1)
+        known = np.isfinite(angle) & np.isfinite(heading)
+        angle = np.clip(np.where(known, angle, glides.angle), lowest, highest)
+        heading = np.where(known, heading, glides.heading)
+        time = (end[:, 2] - begin[:, 2]) / self.sinking(angle, climbs)
+        return Glides(angle, heading, time, glides.departs, np.zeros(len(angle)))
 
     def fit(self, begin: Array, end: Array, glides: Glides) -> NDArray[np.bool_]:
         """Which legs (n,) stay in the flow and in open water."""

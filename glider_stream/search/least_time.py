@@ -73,6 +73,12 @@ class GreatestSpeeds:
         return np.stack([np.interp(along[:, n], *scale) for n, scale in enumerate(self.scales)], axis=1)
 
 
+def least_cost(speeds: GreatestSpeeds, start: Array, goal: Array, cost: Cost) -> float:
+    """A bound below the cost of every route between two points (3,) [m]: its turns are not counted."""
+    left = LeastTimes(speeds, np.stack([start, goal])).remaining(np.array([1]), cost)[1]
+    return float(left[0])
+
+
 class LeastTimes:
     """Bounds below the times between places (n, 3) [m]."""
 

@@ -92,6 +92,40 @@ class Leg:
 
 
 @dataclass(frozen=True)
+class Round:
+    """A round of refinement: new nodes every `spacing` [m] where they could help, the best route then.
+
+    `nodes` that were searched, the new ones among them, and `edges` between them; `travel_time` [s] and `cost` of
+    the best route so far; `gain`, the share of the cost that the round saved.
+    """
+
+    spacing: float
+    nodes: int
+    edges: int
+    travel_time: float
+    cost: float
+    gain: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the path file has it."""
+        return {
+            "spacing_m": self.spacing,
+            "nodes": self.nodes,
+            "edges": self.edges,
+            "travel_time_s": self.travel_time,
+            "cost": self.cost,
+            "gain": self.gain,
+        }
+
+    def told(self, number: int) -> str:
+        """A line for people."""
+        return (
+            f"  round {number}: nodes every {self.spacing:,.0f} m where they could help, {self.nodes:,} in all: "
+            f"{span(self.travel_time)}, {self.gain:.2%} gained"
+        )
+
+
+@dataclass(frozen=True)
 class Path:
     """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
 
@@ -101,7 +135,8 @@ class Path:
     begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
     `expanded`: the share of the nodes from which the search looked for legs, where it did.
     `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds and
-    what cost before it was polished.
+    what cost before it was polished. `rounds` of refinement that led to it;
+    `least`: a bound below the cost of every route, known from the greatest currents.
 
     Examples:
         >>> path = road.query()
@@ -121,6 +156,8 @@ class Path:
     why: str = ""
     unthinned: tuple[int, float] | None = None
     unpolished: tuple[int, float, float] | None = None
+    rounds: tuple[Round, ...] = ()
+    least: float | None = None
     why_not: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
     departure: float | None = None
@@ -169,6 +206,8 @@ class Path:
             **energy,
             **thinned,
             **self._before_polishing(),
+            **({"rounds": [one.as_dict() for one in self.rounds]} if self.rounds else {}),
+            **self._against_the_best(),
             **({} if self.departure is None else {"departure_s": self.departure, "frozen": self.frozen}),
             **({} if self.expanded is None else {"expanded_share": self.expanded}),
             **({} if self.found or not self.why else {"why": self.why}),
@@ -182,6 +221,31 @@ class Path:
             return {}
         legs, time, cost = self.unpolished
         return {"unpolished": {"legs": legs, "travel_time_s": time, "cost": cost}}
+
+    @property
+    def likely_gain(self) -> float | None:
+        """What another round of refinement might save, a share of the cost: an estimate, as much as the last."""
+        return self.rounds[-1].gain if self.rounds else None
+
+    def _against_the_best(self) -> dict[str, Any]:
+        if not self.found or self.least is None:
+            return {}
+        estimate = {} if self.likely_gain is None else {"estimate_of_further_gain": self.likely_gain}
+        return {"lower_bound": {"cost": self.least, "over_it": self._over_least()}, **estimate}
+
+    def _over_least(self) -> float | None:
+        return None if not self.least else self.cost / self.least - 1
+
+    def _told_against_the_best(self) -> list[str]:
+        """A line for people: how far from the best the route may be."""
+        over = self._over_least()
+        if over is None or self.least is None:
+            return []
+        least = f"{self.least / 1000:,.1f} kJ" if self.unit == "J" else span(self.least)
+        line = f"  no route costs less than {least}, by the greatest currents: this one at most {over:.1%} more"
+        if self.likely_gain is not None:
+            line += f"; another round may gain {self.likely_gain:.2%}, an estimate"
+        return [line]
 
     def __str__(self) -> str:
         if self.lonlat is None:
@@ -204,7 +268,9 @@ class Path:
             title += f", {cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         if self.frozen:
             title += f"; {FROZEN}"
-        return "\n".join([title, *(f"  {leg.told(self.departs)}" for leg in self.legs)])
+        rounds = [one.told(n) for n, one in enumerate(self.rounds, 1)]
+        lines = [f"  {leg.told(self.departs)}" for leg in self.legs]
+        return "\n".join([title, *rounds, *lines, *self._told_against_the_best()])
 
 
 def hops_of(path: Path) -> list[Hop]:

@@ -140,7 +140,7 @@ class Polisher:
         """A Newton step, damped as far as it must be: a better route, if there is one, and the next damping."""
         step = _Step.of(self, chain, weight)
         while damping < STIFF:
-            better = self._along(chain, step.move(damping), weight)
+            better = self._along(chain, step, step.move(damping), weight)
             if better is not None:
                 return better, max(damping * FREED, 1e-6)
             damping *= DAMPED
@@ -151,21 +151,25 @@ class Polisher:
         room, _ = self._room(chain.stops, chain.glides, None)
         return chain.cost - weight * float(np.log(room).sum())
 
-    def _along(self, chain: Chain, move: Array, weight: float) -> Chain | None:
+    def _along(self, chain: Chain, step: "_Step", move: Array, weight: float) -> Chain | None:
         """A better route along a move of the stops (n + 1, 3); stops whose legs cannot be flown move less."""
         before, share = self.merit(chain, weight), np.ones(len(chain.stops))
         room = self._room(chain.stops, chain.glides, None)[0]
         for _ in range(SHORTENED):
             stops = self._held(chain.stops + share[:, None] * move)
             stops = np.where((share > 0)[:, None], stops, chain.stops)
-            glides = self.glide(stops, chain.glides.angle, chain.glides.heading)
+            shift = stops - chain.stops
+            turned = np.diff(stops[:, 2]) * np.diff(chain.stops[:, 2]) <= 0
+            if turned.any():  # a leg is no dive any more, or no climb
+                share = np.where(_at_ends(turned), 0.4 * share, share)
+                continue
+            both = np.concatenate([shift[:-1], shift[1:]], axis=1)
+            guess = self.air.aimed(stops[:-1], stops[1:], chain.glides, step.slopes, both)
+            glides = self.glide(stops, guess.angle, guess.heading)
             bad = ~self._within(stops, glides)
             bad |= (self._room(stops, glides, None)[0] < NEARER * room).any(axis=1)
             if bad.any():
-                at = np.zeros(len(stops), np.bool_)
-                at[:-1] |= bad
-                at[1:] |= bad
-                share = np.where(at, 0.4 * share, share)
+                share = np.where(_at_ends(bad), 0.4 * share, share)
                 continue
             after = Chain(stops, glides, self.cost(stops, glides))
             if self.merit(after, weight) < before:
@@ -222,14 +226,26 @@ class Polisher:
         return np.zeros(len(z)) if pumped is None else np.asarray(pumped, np.float64)
 
 
+def _at_ends(legs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The stops (n + 1,) that some of the legs (n,) join."""
+    at = np.zeros(len(legs) + 1, np.bool_)
+    at[:-1] |= legs
+    at[1:] |= legs
+    return at
+
+
 @dataclass(frozen=True)
 class _Step:
-    """Gradient (n - 1, 3) and second derivatives, banded, of a route's cost by its inner stops; what is free."""
+    """Gradient (n - 1, 3) and second derivatives, banded, of a route's cost by its inner stops; what is free.
+
+    `longest` (n - 1,) [m] is how far stops may move, `slopes` are those of the legs.
+    """
 
     gradient: Array
     band: Array
     free: NDArray[np.bool_]
     longest: Array
+    slopes: Slopes
 
     @classmethod
     def of(cls, polisher: Polisher, chain: Chain, weight: float) -> "_Step":
@@ -270,7 +286,7 @@ class _Step:
         free[:, 2] &= ~np.array([polisher.stays(stop) for stop in between], np.bool_)
         length = np.abs(np.diff(stops, axis=0))
         reach = np.maximum(np.linalg.norm(length[:-1], axis=1), np.linalg.norm(length[1:], axis=1))
-        return cls(gradient, band, free, FAR * reach)
+        return cls(gradient, band, free, FAR * reach, slopes)
 
     @staticmethod
     def _curvature(polisher: Polisher, stops: Array, glides: Glides, slopes: Slopes) -> Array:
@@ -285,11 +301,17 @@ class _Step:
                 steps[n] = np.where(climbs == (n == 5), 1.0, -1.0) * np.minimum(steps[n], 0.2 * rise)
             moved[n, :, n] += steps[n]
         there = moved[..., :3].reshape(-1, 3), moved[..., 3:].reshape(-1, 3)
-        angle, heading, departs = (np.tile(one, 6) for one in (glides.angle, glides.heading, glides.departs))
-        beside = polisher.air.glide(*there, angle, heading, departs)
-        change = polisher.air.slopes(*there, beside).time[:, :6].reshape(6, count, 6) - slopes.time[:, :6]
-        change = np.where(beside.exact.reshape(6, count, 1), change / steps[..., None], 0.0)
-        bent = change.transpose(1, 0, 2)
+        # the leg itself and the six beside it, alike: what their first derivatives are off by cancels
+        all_begin, all_end = (
+            np.concatenate([one, six]) for one, six in zip((stops[:-1], stops[1:]), there, strict=True)
+        )
+        repeated = Glides(*(np.tile(values, 7) for values in glides))
+        wide = Slopes(*(np.tile(values, (7, 1)) for values in slopes))
+        shift = np.concatenate([ends, moved.reshape(-1, 6)]) - np.tile(ends, (7, 1))
+        beside = polisher.air.aimed(all_begin, all_end, repeated, wide, shift)
+        first = polisher.air.slopes(all_begin, all_end, beside, one_sided=True).time[:, :6].reshape(7, count, 6)
+        change = (first[1:] - first[0]) / steps[..., None]
+        bent = np.where(np.isfinite(change), change, 0.0).transpose(1, 0, 2)
         return np.asarray(0.5 * (bent + bent.transpose(0, 2, 1)))
 
     def move(self, damping: float) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError, InputWarning
 from ..base.settings import require
+from ..base.untrusted import check_file
 from ..kernels.terrain import Seabed
 from .frame import LocalFrame
 from .ocean.bottom import Bottom
@@ -179,6 +180,7 @@ def _polygons(file: str | Path) -> list[Any]:
     except ImportError:
         raise InputError("polygons need shapely, which is missing: pip install glider-stream[ocean]") from None
     path = Path(file)
+    check_file(path, "the file of polygons")
     require(path.is_file(), f"the file of polygons {path} does not exist")
     size = path.stat().st_size
     require(

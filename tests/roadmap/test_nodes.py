@@ -1,6 +1,7 @@
 """Samplers: in the box, as many as asked, the same for the same seed, never on land, evenly spread."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -133,7 +134,7 @@ def test_every_sampler_has_a_name():
 
 def test_yo_nodes_lie_where_yos_turn_as_dense_as_legs_are_long():
     lo, hi = np.array([-5000.0, -3000.0, -700.0]), np.array([5000.0, 3000.0, 0.0])
-    sampler = YoSampler((0.0, 600.0), per_leg=2.0).for_glide(math.radians(37.5))
+    sampler = YoSampler((0.0, 600.0), per_leg=2.0, jitter=False).for_glide(math.radians(37.5))
     leg = 600.0 / math.tan(math.radians(37.5))
     assert sampler.spacing == pytest.approx(leg / 2)
     nodes = sampler.nodes(lo, hi, lambda points: points[:, 0] < 4000.0)
@@ -141,8 +142,12 @@ def test_yo_nodes_lie_where_yos_turn_as_dense_as_legs_are_long():
     assert nodes[:, 0].max() < 4000.0
     for n in range(2):
         steps = np.diff(np.unique(nodes[:, n]))
-        assert steps.min() >= leg / 2
-        assert steps.max() < leg / 2 * 1.2
+        assert steps.min() > leg / 2 * 0.9
+        assert steps.max() < leg / 2 * 1.1
+    loose = replace(sampler, jitter=True).nodes(lo, hi, lambda points: points[:, 0] < 4000.0)
+    assert set(loose[:, 2]) == {0.0, -600.0}
+    assert abs(len(loose) / len(nodes) - 1) < 0.1
+    assert len(np.unique(loose[:, 0])) == len(loose)
     for wrong, words in (
         ({"depths": (0.0, 600.0)}, "one of them"),
         ({"depths": (0.0, 600.0), "spacing": 5.0, "per_leg": 1.0}, "one of them"),

@@ -14,9 +14,18 @@ from glider_stream.jobs.build import Job, build_file, merge
 from glider_stream.kernels.control import control_of
 from glider_stream.kernels.edges import CONNECTED, Edge
 from glider_stream.roadmap.builder import build_roadmap
-from glider_stream.roadmap.roadmap import EDGE_FIELDS
+from glider_stream.roadmap.roadmap import EDGE_FIELDS, in_order
 from glider_stream.roadmap.shard import Shard
-from glider_stream.roadmap.step_error import StepError, sampled_nodes, step_error
+from glider_stream.roadmap.step_error import (
+    SAMPLED_LEGS,
+    SAMPLED_NODES,
+    UNTRIED,
+    StepError,
+    StepSample,
+    sampled_nodes,
+    step_error,
+    wider_samples,
+)
 from glider_stream.roadmap.store import read_roadmap
 from glider_stream.scenario import read_scenario
 from glider_stream.search.query import Planner
@@ -94,6 +103,32 @@ def test_the_error_is_how_far_an_exact_path_ends_from_the_legs_own(tmp_path, mon
 
 def test_the_sample_is_of_few_nodes_the_last_ones_among_them():
     assert list(sampled_nodes(3)) == [0, 1, 2]
-    assert len(sampled_nodes(100_000)) == 8
+    assert len(sampled_nodes(100_000)) == SAMPLED_NODES
     assert sampled_nodes(100_000)[-1] == 99_999
     assert (np.diff(sampled_nodes(500)) > 0).all()
+
+
+def test_where_few_legs_leave_the_first_nodes_more_are_asked(tmp_path):
+    sparse = problem(tmp_path, "steering.method=surface", "steering.candidates=6", "integration.tolerance=4.0")
+    road = build_roadmap(sparse)
+    first = sampled_nodes(len(road.position))
+    few = int(np.diff(road.indptr)[first].sum())
+    tried = int(road.provenance.steps.split("at most of ")[1].split()[0])
+    assert few < tried == min(road.target.size, SAMPLED_LEGS)
+
+
+def test_a_query_flies_what_legs_there_are_where_the_build_had_none_to_fly(tmp_path, monkeypatch):
+    coarse = problem(tmp_path, *COARSE)
+    with monkeypatch.context() as patch:
+        patch.setattr(StepError, "check", lambda self: None)
+        patch.setattr(StepSample, "_legs", lambda self, find: in_order([]))
+        untried = build_roadmap(coarse)
+    assert untried.provenance.steps == f"of 120 s, {UNTRIED}"
+    with pytest.raises(InputError, match="too coarse for this flow"):
+        Planner(untried, coarse)
+
+
+def test_samples_grow_to_all_nodes_or_the_most():
+    assert [list(nodes) for nodes in wider_samples(3)] == [[0, 1, 2]]
+    assert [nodes.size for nodes in wider_samples(20)] == [16, 20]
+    assert [nodes.size for nodes in wider_samples(10**6)] == [16, 32, 64, 128]

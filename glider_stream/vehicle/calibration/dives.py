@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
+from ...base.untrusted import check_file
 
 COLUMNS = {
     "vertical": (
@@ -129,6 +130,7 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
 
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Return the header and the rows with their line numbers."""
+    check_file(path, "the file of dives")
     require(path.is_file(), f"the file of dives {path} does not exist; give a CSV file")
     size = path.stat().st_size
     require(size <= MOST_TEXT, f"{path.name} holds {size:,} bytes, more than {MOST_TEXT:,}; cut it")

@@ -1,5 +1,6 @@
 """Axes of ocean files: checks degrees and depths and brings them into one form."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from .units import in_metres
 
 MOST_POINTS = 100_000_000
 """A grid may have at most this many points."""
+MOST_ALIKE = 4
+"""So many points of a grid that is folded or closed around the globe may lie at one place."""
 
 
 def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
@@ -27,8 +30,7 @@ def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
         f"{subject} has missing values; mend them, or set another `{kind}` in `names`",
     )
     order = np.arange(axis.size)
-    if str(variable.attrs.get("units", "")).strip().lower() in ("radian", "radians", "rad"):
-        axis = np.degrees(axis)
+    axis = _signed(subject, variable, np.degrees(axis) if _is_radian(variable) else axis)
     if axis.size > 1 and bool(np.median(np.diff(axis)) < 0):
         axis, order = axis[::-1], order[::-1]
     if kind == "lon":
@@ -40,6 +42,47 @@ def degrees(name: str, variable: Any, kind: str) -> tuple[Array, Index]:
     cure = f"sort the file, or set another `{kind}` in `names`"
     require(bool((np.diff(axis) > 0).all()), f"{subject} does not rise or fall steadily; {cure}")
     return axis, order
+
+
+WESTERN = {"lon": "west", "lat": "south"}
+"""Where a coordinate may count to, against the convention."""
+
+
+def _is_radian(variable: Any) -> bool:
+    return units_of(variable).lower() in ("radian", "radians", "rad")
+
+
+def told(variable: Any, kind: str) -> str:
+    """The name of a longitude or latitude, and that it counts the other way, where it does."""
+    turned = f", counted toward {WESTERN[kind]}: its sign is turned"
+    return f"{variable.name}{turned if _is_turned(variable) else ''}"
+
+
+def _is_turned(variable: Any) -> bool:
+    """Whether a coordinate says that it counts toward west or south."""
+    # a small s at the end is a plural
+    return re.match(r"degrees?_?([Ww]est|[Ss]outh|W|S)$", units_of(variable)) is not None
+
+
+def _signed(subject: str, variable: Any, values: Array) -> Array:
+    """Degrees toward east or north; InputError where a sign contradicts the unit."""
+    if not _is_turned(variable):
+        return values
+    units = units_of(variable)
+    right = "degrees_east" if re.search(r"([Ww]est|W)$", units) else "degrees_north"
+    require(
+        not bool((values < 0).any()),
+        f"{subject} is in {units!r} and goes down to {np.nanmin(values, initial=0.0):g}: if it counts toward the "
+        f"other side, set its unit to {right!r}",
+    )
+    return np.asarray(-values)
+
+
+def _same_for_both(at_lon: Array, at_lat: Array) -> NDArray[np.bool_]:
+    """Points that hold one number for longitude and latitude, as several others do: a mark, and no place."""
+    same = at_lon == at_lat
+    marks, counts = np.unique(at_lon[same], return_counts=True)
+    return np.asarray(same & np.isin(at_lon, marks[(counts > MOST_ALIKE) | ((marks == 0) & (counts > 1))]))
 
 
 def _once_around(axis: Array, order: Index) -> tuple[Array, Index]:
@@ -76,11 +119,12 @@ def places(name: str, lon: Any, lat: Any) -> tuple[Array, Array, NDArray[np.bool
     size = lon.size
     require(size <= MOST_POINTS, f"the longitude `{lon.name}` in {name} claims {size:,} points; cut the file")
     at_lon, at_lat = (np.array(variable.values, dtype=np.float64) for variable in (lon, lat))
-    if str(lon.attrs.get("units", "")).strip().lower() in ("radian", "radians", "rad"):
+    if _is_radian(lon):
         at_lon, at_lat = np.degrees(at_lon), np.degrees(at_lat)
     missing = ~(np.isfinite(at_lon) & np.isfinite(at_lat)) | (np.abs(at_lat) > 90.001) | (np.abs(at_lon) > 1080)
-    still = (at_lon == 0) & (at_lat == 0)
-    missing |= still if still.sum() > 1 else False
+    missing |= _same_for_both(at_lon, at_lat)
+    for variable, values, kind in ((lon, at_lon, "longitude"), (lat, at_lat, "latitude")):
+        values[~missing] = _signed(f"the {kind} `{variable.name}` in {name}", variable, values[~missing])
     require(
         float(missing.mean()) < 0.9,
         f"the places `{lon.name}` and `{lat.name}` in {name} are missing, or are not degrees, nearly everywhere; "

@@ -83,6 +83,10 @@ def read_bathymetry(
         return _read(path.name, data, frame, lon, lat, beyond, chart)
 
 
+ONLY_BAND = "band_data"
+"""What a GeoTIFF's band is called: whether it counts up or down is for the user to say."""
+
+
 def _pick(name: str, data: Any, variable: str | None) -> Any:
     if variable is not None:
         require(
@@ -105,6 +109,8 @@ def _pick(name: str, data: Any, variable: str | None) -> Any:
             not hits,
             f"{name} holds {len(hits)} bathymetries, {listing(field.name for field in hits)}: set `variable`",
         )
+    if [one.name for one in fields] == [ONLY_BAND]:
+        return fields[0]
     raise InputError(
         f"{name} holds no bathymetry with a known name; set `variable` to one of: {listing(data.data_vars)}"
     )

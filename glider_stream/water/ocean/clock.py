@@ -41,6 +41,11 @@ TITLES = (
     "source",
 )
 MEAN_WORDS = ("mean", "average", "averaged", "avg")
+NO_CURRENT_THEN = re.compile(r"max|min|range|std|standard_dev|variance|sum|root_mean|mid_range|mode\b")
+"""What `cell_methods` may say of an interval that no current at any time of it is."""
+MONTHS = "jan feb mar apr may jun jul aug sep oct nov dec"
+ZONES = {"t", "z", "ut", "utc", "gmt", *MONTHS.split()}
+"""Words in the date from which times count: months, and names of UTC alone. Libraries pass over all others."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,14 @@ def _decoded(
             f"{variable.size} times are unknown: set `origin` in `names`, the date from which they count",
         )
         return None, (f"`{variable.name}` has no date",)
+    origin = SINCE.split(units, maxsplit=1)[-1].lower()
+    strange = [word for word in re.findall(r"[a-z]+", origin) if word not in ZONES]
+    offset = re.search(r"(utc?|gmt)\s*[-+]\s*\d", origin)
+    require(
+        not strange and offset is None,
+        f"{subject} counts from a date in a zone that cannot be told ({units!r}): write the zone into the unit "
+        "as an offset from UTC, such as +02:00",
+    )
     raw = np.atleast_1d(np.asarray(variable.values))
     require(
         raw.dtype.kind in "fiu" and bool(np.isfinite(raw).all()),
@@ -156,6 +169,11 @@ def _middles(at: Catalogue, variable: Any, clock: str, times: Times) -> tuple[Ti
     """Return the times, a description and notes; times of means are moved to the middle of their intervals."""
     method = _over_time(variable, clock)
     mean = method in MEAN_WORDS
+    require(
+        NO_CURRENT_THEN.match(method) is None,
+        f"`{variable.name}` in {at.name} is the {method} over time, as its `cell_methods` says, and no current "
+        "that flows at any time: give a file of instants or means",
+    )
     if at.names.stamps is not None:
         # the interval is known only when all files are joined
         return times, f"means, stamped at the {at.names.stamps} of their interval, as you say", ()

@@ -14,7 +14,7 @@ from ...base.checks import Range
 from ...base.errors import InputError
 from ...base.settings import require
 from ..frame import wrapped
-from .axes import degrees, places
+from .axes import degrees, places, told
 from .clock import Clock, clock_of
 from .doubts import doubts_of, speed_doubts
 from .file import Times
@@ -29,6 +29,7 @@ from .part import Field, Part
 from .quality import Order, bad_by_flags, spread_over
 from .sigma import fixed_depths, to_fixed
 from .units import in_metres_per_second
+from .valid import outside_range
 
 Values = NDArray[np.float32]
 Domain = tuple[Range, Range, Range]
@@ -147,7 +148,7 @@ class Component:
     def _points(self) -> Points:
         """Return the points of the component in the whole file."""
         dims, lon, lat = horizontal_of(self.at, self.variable, self.component)
-        took = {"lon": str(lon.name), "lat": str(lat.name)}
+        took = {kind: told(one, kind) for kind, one in (("lon", lon), ("lat", lat))}
         many = "of two points or more: a plan needs a grid, and a current at one position is not a grid"
         if lon.ndim == 1:
             (at_lon, columns), (at_lat, rows) = degrees(self.file, lon, "lon"), degrees(self.file, lat, "lat")
@@ -322,7 +323,9 @@ class Component:
         if points.placeless is not None:
             values = np.where(points.placeless, np.float32(np.nan), values)
         values = self._masked(values, place, order)
+        values, beyond = outside_range(self.variable, values, self._factor()[0] or 1.0)
         values, notes = bad_by_flags(self.at, self.variable, values, place, order)
+        notes = (*beyond, *notes)
         if levels.sigma is None or floor is None:
             return values, notes
         assert levels.depth is not None

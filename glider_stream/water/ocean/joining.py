@@ -86,6 +86,8 @@ def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
     u[missing] = v[missing] = np.nan
     depth = _model_depth(east, north, grid)
     known = None if depth is None else np.isfinite(depth)
+    if depth is not None and names.zeros != "calm":
+        _clear_under(depth, levels, u, v)
     zeros = both_still(east.zeros, north.zeros)
     found = mark_land(name, u, v, deeper, zeros, known, names.zeros)
     notes += found
@@ -218,6 +220,18 @@ def _model_depth(east: Part, north: Part, grid: Grid) -> Array | None:
     if east.levels.sigma is not None:
         return _seabed_at(first, second, grid)
     return first.least(*grid.mesh())
+
+
+def _clear_under(depth: Array, levels: Levels, u: Values, v: Values) -> None:
+    """NaN, in place, where u, v (nt, nz, ny, nx) are 0 below the depth (ny, nx) [m] that the model has.
+
+    Read between levels, such zeros would slow the water above the seabed.
+    """
+    if levels.depth is None or levels.sigma is not None:
+        return
+    still = ((u == 0) & (v == 0)).all(axis=0)
+    under = still & (levels.depth[:, None, None] > depth)
+    u[:, under] = v[:, under] = np.nan
 
 
 def _seabed(

@@ -15,7 +15,7 @@ from .names import Names, standard_name
 Values = NDArray[np.float32]
 
 NO_DATA = 1e3
-"""Numbers above this are fill values that the file does not declare: no unit of a current gives such a number."""
+"""In cm/s or larger units, numbers above this are fill values that the file does not declare."""
 FASTEST = 9.0
 """No ocean current is as fast as this [m/s]: a faster value is a fill value or has another unit."""
 ALONE = 2
@@ -24,7 +24,7 @@ ALONE = 2
 Larger patches of zeros are land.
 """
 SEA_IS_ONE = re.compile(
-    r"^([tuv]mask(util)?|mask_(rho|u|v|t)|wet(_[cuvt])?|sea_binary_mask|sea_mask)$", re.IGNORECASE
+    r"^([tuv]mask(util)?|(wetdry_)?mask_(rho|u|v|t)|wet(_[cuvt])?|sea_binary_mask|sea_mask)$", re.IGNORECASE
 )
 LAND_IS_ONE = re.compile(r"^(land_binary_mask|land_mask|landmask)$", re.IGNORECASE)
 EITHER = re.compile(r"^(mask|lsm|land_sea_mask|landsea|binary_mask)$", re.IGNORECASE)
@@ -47,6 +47,8 @@ def mask_of(name: str, data: Any, names: Names, variable: Any, component: str) -
     candidates = (
         [names.mask] if names.mask else [str(n) for n in data.variables if _is_mask(str(n), data[n], component)]
     )
+    # what falls dry with the tide is land then; there the model leaves the last current that it had
+    candidates.sort(key=lambda candidate: not candidate.lower().startswith("wetdry_"))
     for mask in (data[n] for n in candidates):
         extra = [dim for dim in mask.dims if dim not in variable.dims]
         fits = len(mask.dims) - len(extra) >= 2 and all(mask.sizes[dim] == 1 for dim in extra)
@@ -87,7 +89,8 @@ def _on_land(mask: Any, variable: Any) -> float | None:
 
 def clear_marks(file: str, name: str, values: Values, factor: float | None) -> tuple[Values, tuple[str, ...]]:
     """Return values in m/s, NaN where there is no data, and a note on fill values that were found."""
-    values = np.where(np.abs(values) > NO_DATA, np.float32(np.nan), values)
+    # in mm/s or m/day a current may well have thousands
+    values = np.where(np.abs(values) > max(NO_DATA, FASTEST / (factor or 1.0)), np.float32(np.nan), values)
     values *= np.float32(factor or 1.0)
     beyond = np.abs(values) > FASTEST
     if not beyond.any():

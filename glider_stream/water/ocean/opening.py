@@ -1,6 +1,8 @@
 """Opens ocean files, which are untrusted input: NetCDF of all versions and Zarr, by xarray."""
 
+import errno
 import json
+import os
 import re
 import traceback
 import warnings
@@ -14,6 +16,7 @@ from typing import Any
 from ...base.errors import InputError
 from ...base.settings import require
 from ...base.untrusted import check_claim, check_file, check_links, groups_of
+from .grib import open_grib
 
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """The first bytes of TIFF files."""
@@ -52,6 +55,8 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
     import cf_xarray  # noqa: F401  (registers the accessor)
     import xarray
 
+    address = re.match(r"[a-z][\w+.-]+:{1,2}/", str(path)) is not None and not path.exists()
+    require(not address, f"{path} is an address: download the file, and name it where it is then")
     require(path.exists(), f"the file {path} does not exist")
     check_file(path, "the file")
     engine, more = _engine(path)
@@ -62,7 +67,12 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
         with warnings.catch_warnings():
             # warnings of the reading packages, and of old attributes: several fill values, odd calendars
             warnings.simplefilter("ignore")
-            data = xarray.open_dataset(path, engine=engine, decode_times=False, cache=False, **more)
+            if engine == "cfgrib":
+                data = open_grib(path)
+            else:
+                data = xarray.open_dataset(path, engine=engine, decode_times=False, cache=False, **more)
+            if engine == "rasterio":
+                data = data.rio.write_coordinate_system()
     except InputError:
         raise
     except Exception as error:
@@ -83,7 +93,22 @@ def opened(path: Path, group: str | None = None) -> Iterator[Any]:
             raise
 
 
+DISK = {
+    getattr(errno, name)
+    for name in ("ESTALE", "EIO", "ETIMEDOUT", "ENOTCONN", "EHOSTDOWN", "EREMOTEIO", "ENXIO")
+    if hasattr(errno, name)
+}
+"""Errors of a disk or of a network's file system, which say nothing of the file."""
+
+
 def _damaged(path: Path, error: Exception) -> InputError:
+    said = re.search(r"errno = (\d+)", str(error))
+    number = int(said[1]) if said else getattr(error, "errno", None)
+    if isinstance(number, int) and number in DISK:
+        return InputError(
+            f"{path.name} cannot be read: {os.strerror(number).lower()}; look to its disk or network, then give "
+            "the same command again"
+        )
     what = str(error).splitlines()[0] if str(error) else type(error).__name__
     return InputError(f"{path.name} cannot be read; it may be truncated or damaged ({what}): get it again")
 
@@ -161,7 +186,7 @@ def _engine(path: Path) -> tuple[str, dict[str, Any]]:
     if head[:4] in (b"CDF\x01", b"CDF\x02"):
         return "scipy", {}
     if head[:4] == b"GRIB" and find_spec("cfgrib") is not None:
-        return "cfgrib", {"backend_kwargs": {"indexpath": ""}}
+        return "cfgrib", {}
     if head[:4] in TIFF and find_spec("rioxarray") is not None:
         return "rasterio", {}
     for mark, what in OTHER_KINDS.items():

@@ -1,0 +1,94 @@
+"""The level set: closed forms from below, in two and three dimensions; its error; what it refuses."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.small import command, roadmap, scenario_file, strict_json
+
+from glider_stream.base.errors import InputError
+from glider_stream.evaluation.level_set import Bound, Front, Waters, bound, dimensions_of
+from glider_stream.scenario import scenario_from_text
+from glider_stream.water.analytic import Uniform
+
+HEIGHTS = (-150.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """The small scenario made into objects, in an even current."""
+    small = scenario_from_text(roadmap().provenance.scenario).problem()
+    even = Uniform(0.3, -0.1).kernel(HEIGHTS)
+    return replace(small, evaluator=replace(small.evaluator, flow=even))
+
+
+def exact(problem):
+    """The least time in an even current at one depth: |goal - start - current T| = Vh T."""
+    current, way = np.array([0.3, -0.1]), (problem.goal - problem.start)[:2]
+    fastest = float(problem.evaluator.polar.best_horizontal.max())
+    a, b = fastest**2 - current @ current, current @ way
+    return (-b + math.sqrt(b * b + a * (way @ way))) / a
+
+
+@pytest.mark.parametrize(("dimensions", "nodes", "share"), [(2, 51, 0.02), (3, 23, 0.06)])
+def test_in_an_even_current_it_is_the_closed_form_from_below(problem, dimensions, nodes, share):
+    found = bound(problem, dimensions, nodes)
+    best = exact(problem)
+    assert found.least <= best
+    assert found.time == pytest.approx(best, rel=share)
+    assert found.dimensions == dimensions
+
+
+def test_against_the_current_it_takes_longer(problem):
+    there = bound(problem, 2, 41)
+    back = bound(replace(problem, start=problem.goal, goal=problem.start), 2, 41)
+    assert back.time > 1.3 * there.time
+
+
+def test_the_front_does_not_enter_land(problem):
+    waters = Waters(problem, 2)
+    front = Front(waters, 41, 60.0)
+    free = front.arrival()
+    across = np.abs(front.nodes @ np.array([1.0, -1.0])) < 40.0  # a wall across the way, with a gap far off
+    wall = across & (front.nodes[:, 0] < 200.0)
+    front.water &= ~wall.reshape(front.shape)
+    assert front.arrival() > 1.05 * free
+
+
+def test_long_routes_are_bounded_in_two_dimensions(problem):
+    assert dimensions_of(problem) == 3
+    far = replace(problem, goal=problem.start + np.array([9000.0, 0.0, 0.0]))
+    assert dimensions_of(far) == 2
+
+
+def test_it_says_what_it_is():
+    flat, deep = Bound(3600.0, 36.0, 2, (500.0, 400.0)), Bound(3600.0, 36.0, 3, (50.0, 40.0, 30.0))
+    assert flat.as_dict()["kind"] == "estimate"
+    assert deep.as_dict()["kind"] == "bound"
+    assert flat.least == 3564.0
+    assert str(flat).startswith("no route takes less than 3,564 s (0.99 h): a level set in the mean current")
+    assert "50 x 40 x 30 m" in str(deep)
+
+
+def test_what_cannot_be_bounded_is_refused(problem):
+    for changes, asked, words in (
+        ({}, {"dimensions": 4}, "`dimensions` must be 2 or 3; got 4"),
+        ({}, {"nodes": 5}, "`nodes` must be at least 21; got 5"),
+        ({"start": None}, {}, "the scenario has no"),
+    ):
+        with pytest.raises(InputError, match=words):
+            bound(replace(problem, **changes), **asked)
+    strong = replace(problem.evaluator, flow=Uniform(1.5, 0.0).kernel(HEIGHTS))
+    upstream = replace(problem, evaluator=strong, start=problem.goal, goal=problem.start)
+    with pytest.raises(InputError, match="no front reaches the goal"):
+        bound(upstream, 2, 21)
+
+
+def test_the_command_line_bounds(capsys, tmp_path):
+    said = command(capsys, "bound", scenario_file(tmp_path), "--nodes", 21, "--json")
+    assert said.err.startswith("bound: a grid of ")
+    found = strict_json(said.out)
+    assert 0.0 < found["least_s"] <= found["time_s"]
+    # no route of the roadmap is quicker
+    assert found["least_s"] < 489.0
