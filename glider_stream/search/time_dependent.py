@@ -30,6 +30,8 @@ MOST_BINS, FEWER_BINS = 240, 48
 """How many bins of time after departure a search with bins looks at; and one that was not asked to use them."""
 LATER_FANS = 256
 """Fans of a second look, for a better path: enough for all ways where nodes are few."""
+TRIED_FANS = 32
+"""So many where the first look took more than `LATER_FANS`: then all ways can hardly be followed."""
 NARROWEST = 8.0
 """Bins are not halved below so many seconds: two ways that arrive so soon after each other go on alike."""
 BETTER = 1e-3
@@ -96,7 +98,8 @@ class ClockPlanner(RoutePlanner):
             return path
         widest, departure = float(np.median(durations)), self.problem.departure
         latest = departure + FEWER_BINS * widest
-        expansion = BoundedExpansion(self._expansion(ends), LATER_FANS if path.found else math.inf)
+        fans = LATER_FANS if search.tally.fans <= LATER_FANS else min(TRIED_FANS, LATER_FANS)
+        expansion = BoundedExpansion(self._expansion(ends), fans if path.found else math.inf)
         best, width, finest, whole = path, widest, math.inf, True
         while whole and width >= NARROWEST:
             below = (best.cost if search.by_cost else departure + best.travel_time) - BETTER
@@ -104,7 +107,7 @@ class ClockPlanner(RoutePlanner):
             # why there is no path tell the widest bins, whose ways are the most that were all followed
             found, again = self._first(ends, later, expansion, known=best.found or width < widest)
             best = found if found.found or (width == widest and not best.found) else best
-            whole, expansion.most = again.whole, max(LATER_FANS, expansion.found)
+            whole, expansion.most = again.whole, max(fans, expansion.found)
             finest = width if whole else finest
             width /= 2
         if not best.found:
