@@ -1,4 +1,4 @@
-"""What a query may ask beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs, a polish."""
+"""Options of a query beyond the cheapest path: a rule of surfacing, a bound on energy, fewer legs, polishing."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,18 +27,18 @@ from .time_dependent import ClockPlanner
 from .trade_off import TradeOff
 
 SAME = 1e-6
-"""Departures [s] that lie no further apart are one: sums of times round."""
+"""Two departures that differ by less than this [s] count as the same: sums of times have rounding errors."""
 Ends = tuple[Array | None, Array | None]
-"""Start and goal (3,) [m]; None for the scenario's own."""
+"""Start and goal (3,) [m]; None stands for the start or goal of the scenario."""
 Refinement = Callable[[Path, Callable[[Path], Path] | None], Path]
-"""Refines a path; each round's routes go through the second, if there is one."""
+"""A function that refines a path; its second argument, if given, polishes the routes of each round."""
 
 
 def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing) -> RoutePlanner:
-    """The planner whose paths keep a rule of surfacing, over a roadmap, or over a scenario's nodes if None.
+    """Return the planner for a roadmap, or for the scenario's nodes if `roadmap` is None; its paths keep `rule`.
 
-    In a flow that changes the clock runs, and a roadmap gives its nodes alone, or its slices where it has some;
-    but where the problem is `frozen`.
+    In a flow that changes with time the clock runs, unless the problem is `frozen`. Then the planner uses the
+    slices of the roadmap; if the roadmap has no slices, it uses only the nodes.
     """
     if isinstance(roadmap, SlicedRoadmap):
         if not problem.frozen:
@@ -53,7 +53,7 @@ def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: 
 
 
 def _slice_of(roadmap: SlicedRoadmap, departure: float) -> Roadmap:
-    """The slice of a departure [s]; InputError where there is none."""
+    """Return the slice of a departure [s]; InputError if the roadmap has no slice at that time."""
     number = np.flatnonzero(np.abs(roadmap.departures - departure) < SAME)
     times = ", ".join(f"{time:g}" for time in roadmap.departures[:20])
     what = (
@@ -72,10 +72,11 @@ def best_path(
     refine: Refinement | None = None,
     thinned: float | None = None,
 ) -> Path:
-    """The cheapest path; within `most_energy` [J] the fastest; with `thinned` [m] of fewer legs, where they hold.
+    """Return the cheapest path, or with `most_energy` [J] the fastest path that uses no more energy.
 
-    With `polish` its stops are moved until nothing near costs less; `refine` adds nodes where they can help.
-    InputError where `most_energy` is asked of a roadmap that has no energies, or with either of these.
+    With `thinned` [m] the path gets fewer legs where these can be flown. With `polish` its stops are moved until
+    no route near it costs less. `refine` adds nodes where they can help. InputError if `most_energy` is given and
+    the roadmap has no energies, or if `most_energy` is given together with `polish` or `refine`.
     """
     for asked, done in ((polish, "polished"), (refine is not None, "refined")):
         both = asked and most_energy is not None
@@ -90,7 +91,7 @@ def best_path(
         path = planner.within(*ends, most_energy)
     notes = path.notes
     if refine is not None:
-        path = refine(path, (lambda one: polished(one, planner)) if polish else None)
+        path = refine(path, (lambda route: polished(route, planner)) if polish else None)
     elif polish:
         path = polished(path, planner)
     path = path if thinned is None else with_fewer_legs(path, thinned, planner, most_energy)
@@ -98,7 +99,7 @@ def best_path(
 
 
 def front(planner: RoutePlanner, ends: Ends) -> TradeOff:
-    """Every path that no other beats both in time and in energy."""
+    """Return every path for which no other path is better both in time and in energy."""
     _check_energy(planner)
     return planner.front(*ends)
 
@@ -110,7 +111,7 @@ def _check_energy(planner: RoutePlanner) -> None:
 
 
 def with_fewer_legs(path: Path, tolerance: float, planner: RoutePlanner, most_energy: float | None) -> Path:
-    """A path thinned, or as it is where fewer legs would break what else was asked for."""
+    """Return the path with fewer legs; unchanged if these break the rule of surfacing or the bound on energy."""
     rule = planner.rule
     bound = rule != Surfacing()
     stays = (lambda stop: bool(stop[2] >= -SURFACE)) if bound else (lambda stop: False)
@@ -120,10 +121,10 @@ def with_fewer_legs(path: Path, tolerance: float, planner: RoutePlanner, most_en
 
 
 def polished(path: Path, planner: RoutePlanner) -> Path:
-    """A path with its stops moved, its legs cut and its yos counted anew; as it is where that gains nothing.
+    """Return the path with moved stops, cut legs and another number of yos; unchanged if that gains nothing.
 
-    Stops at the surface stay there where a rule of surfacing asks for them, and in a geographic scenario, where a
-    vehicle's files are made of them.
+    Stops at the surface stay there if there is a rule of surfacing. They also stay there in a geographic
+    scenario, because a vehicle's files are made from them.
     """
     if not path.legs:
         return path

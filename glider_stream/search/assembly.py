@@ -1,4 +1,4 @@
-"""Assembly: legs that a search has chosen made into the path that is flown."""
+"""Assembly: makes the path that is flown from the legs that a search has chosen."""
 
 import math
 from abc import ABC, abstractmethod
@@ -19,20 +19,20 @@ from .trade_off import TradeOff
 
 EXACT_MAY_FIND = (Status.NO_HIT, Status.BLOCKED, Status.CURRENT_TOO_STRONG)
 FLOWN_AGAIN = 0.1
-"""By how much a leg that is flown again may miss by more than the tolerance, in tolerances: as in verify."""
+"""A leg that is flown again may miss by one tolerance and this share of it more, as in `verify`."""
 
 
 class Assembly:
-    """Makes paths of legs in a problem's flow; with `frozen` every leg is flown as at the problem's departure."""
+    """Makes paths from legs in a problem's flow; with `frozen` every leg meets the current of the departure."""
 
     def __init__(self, problem: Problem, frozen: bool) -> None:
-        """`frozen` says nothing of a steady flow."""
+        """Keep the problem; `frozen` has no effect in a steady flow."""
         self.problem = problem
         self.changes = not is_steady(problem.evaluator.flow)
         self.frozen = frozen and self.changes
 
     def begins(self, since: float) -> float:
-        """The time [s] whose current a leg meets that begins `since` [s] after departure."""
+        """Return the flow's time [s] for a leg that begins `since` [s] after departure."""
         return self.problem.departure + since if self.clock_runs else self.problem.departure
 
     @property
@@ -41,10 +41,10 @@ class Assembly:
         return self.changes and not self.frozen
 
     def connect(self, start: Array, end: Array, begins: float) -> Edge:
-        """One glide between two points (3,) [m], as the roadmap's method finds it, else by the flow map.
+        """Return one glide between two points (3,) [m]: by the roadmap's method, else by the flow map.
 
-        A line or a surface of controls finds few of the glides that there are; what it says of a pair that
-        the flow map does not join either stays. In a flow that ends, no glide ends later.
+        The control line and the control surface find only few of the glides that exist. If the flow map finds no
+        glide either, the status of the roadmap's method is returned. No glide ends after the flow's last time.
         """
         evaluator = self.problem.evaluator
         edge = evaluator.connect_pair(start, end, begins)
@@ -55,7 +55,7 @@ class Assembly:
         return Edge(int(Status.NO_HIT), *[math.nan] * 6) if late else edge
 
     def fly(self, hops: list[Hop]) -> Path:
-        """The path of some legs flown again; InputError where one does not end where it says."""
+        """Fly legs again and return their path; InputError if a leg does not end at its target."""
         path = self.path(hops[0][0], hops[-1][1], hops)
         most = (1 + FLOWN_AGAIN) * self.problem.evaluator.integration.tolerance
         for n, leg in enumerate(path.legs, 1):
@@ -64,13 +64,13 @@ class Assembly:
         return path
 
     def path(self, start: Array, goal: Array, hops: list[Hop]) -> Path:
-        """The path of some legs; of none where start and goal are one point."""
+        """Return the path of `hops`; the list is empty if start and goal are the same point."""
         legs, clock = [], 0.0
         for source, target, edge in hops:
             begins = self.begins(clock)
             rows = self.problem.evaluator.trace(source, edge, begins)
             rows[:, 0] += clock - begins
-            # the sum above rounds: legs follow each other exactly, and no row lies beyond its leg's end
+            # the sum above has rounding errors; legs must follow each other exactly, each row within its leg
             rows[:, 0] = np.clip(rows[:, 0], clock, clock + edge.time)
             rows[[0, -1], 0] = clock, clock + edge.time
             control = edge.glide_angle, edge.heading, edge.speed
@@ -83,11 +83,11 @@ class Assembly:
         return self._titled(start, goal, self.cost(hops), tuple(legs))
 
     def no_path(self, start: Array, goal: Array, why: str = "") -> Path:
-        """The honest no."""
+        """Return a path that is not found, with the reason `why`."""
         return self._titled(start, goal, math.inf, (), why)
 
     def cost(self, hops: list[Hop]) -> float:
-        """The scenario's own cost of some legs, their turns included."""
+        """Return the scenario's cost of `hops`, with the cost of their turns."""
         dived, turns = True, 0.0
         for source, _, edge in hops:
             climbs = edge.glide_angle > 0
@@ -120,50 +120,51 @@ class Assembly:
 
 
 class RoutePlanner(ABC):
-    """What answers queries, whether from a roadmap's legs or by legs found with the clock running.
+    """The interface of all planners: those that use a roadmap's legs, and those that find legs as the clock runs.
 
-    `rule`: of surfacing; its paths keep it. Points are (3,) [m]; None for the scenario's own start or goal.
+    All paths keep `rule`, the rule of surfacing. Points are (3,) [m]; None stands for the scenario's start or
+    goal.
     """
 
     def __init__(self, problem: Problem, rule: Surfacing, frozen: bool) -> None:
-        """`frozen`: in a flow that changes every leg meets the current of the departure."""
+        """Keep problem and rule; with `frozen` every leg meets the current of the departure."""
         self.problem, self.rule, self.assembly = problem, rule, Assembly(problem, frozen)
 
     @abstractmethod
     def query(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> Path:
-        """The cheapest path between two points."""
+        """Return the cheapest path between two points."""
 
     @abstractmethod
     def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
-        """The fastest path that costs no more than so much; where there is none, why."""
+        """Return the fastest path that costs at most `most_cost`; if no path does, it says why."""
 
     @abstractmethod
     def front(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> TradeOff:
-        """Every path that no other beats both in time and in energy, by rising time."""
+        """Return every path for which no other is better both in time and in energy, sorted by time."""
 
     @abstractmethod
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
-        """Costs of the cheapest paths from n points to m others: (n, m), inf where there is none."""
+        """Return the costs of the cheapest paths from n points to m others: (n, m); inf where no path exists."""
 
     @abstractmethod
     def arrivals(self, start: ArrayLike | None = None) -> Array:
-        """When each node (n,) can be reached at the soonest [s since departure]; inf where it cannot."""
+        """Return the earliest time [s after departure] at each node (n,); inf where a node is not reached."""
 
     @abstractmethod
     def leaving(self, since: float) -> "RoutePlanner":
-        """The same planner for routes that leave `since` [s] later."""
+        """Return the same planner for routes that leave `since` [s] later."""
 
     def connect(self, start: Array, end: Array, since: float = 0.0) -> Edge:
-        """One glide between two points, begun `since` [s] after departure; see `Assembly.connect`."""
+        """Return one glide between two points that begins `since` [s] after departure; see `Assembly.connect`."""
         return self.assembly.connect(start, end, self.assembly.begins(since))
 
     def fly(self, hops: list[Hop]) -> Path:
-        """The path of some legs flown again; InputError where one does not end where it says."""
+        """Fly legs again and return their path; InputError if a leg does not end at its target."""
         return self.assembly.fly(hops)
 
 
 def placed_end(problem: Problem, point: ArrayLike | None, named: Array | None, name: str) -> Array:
-    """Where an end of a query is (3,) [m], the scenario's `named` where none is given; checked."""
+    """Return an end of a query (3,) [m], after checks; it is the scenario's `named` if `point` is None."""
     if point is None:
         require(named is not None, f"the scenario names no {name}; give one with --{name} X,Y,Z")
         point = named
@@ -174,5 +175,5 @@ def placed_end(problem: Problem, point: ArrayLike | None, named: Array | None, n
 
 
 def nodes_at(position: Array, place: Array) -> Index:
-    """The nodes of (n, 3) [m] that lie at a place, often none."""
+    """Return the numbers of the nodes (n, 3) [m] that lie exactly at a place; often the result is empty."""
     return np.flatnonzero((position == place).all(axis=1))

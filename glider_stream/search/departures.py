@@ -1,4 +1,4 @@
-"""When to leave: arrival and travel time against departure, and the latest departure that arrives in time."""
+"""When to leave: arrival and travel time of several departures, and the latest departure that arrives in time."""
 
 import math
 from collections.abc import Callable
@@ -15,17 +15,18 @@ from .path import Path
 Moment = float | str
 """A time: seconds of the flow, or ISO 8601 (UTC) where the flow has a calendar."""
 COUNT = 24
-"""Departures that are tried between two times, unless told."""
+"""If no step is given, the time between the first and the last departure is cut into this many steps."""
 MOST = 2000
+"""No more departures than this are tried in one call."""
 CLOSE = 30.0
-"""The latest departure in time is found to so many seconds."""
+"""The latest departure that arrives in time is found with this accuracy [s]."""
 
 
 @dataclass(frozen=True)
 class Departures:
-    """The paths of some departures, in their order, and the one that is `best`: that costs the least.
+    """The paths of some departures, in order of departure; `best` is the path with the least cost.
 
-    `by` [s of the flow]: when a path must arrive, and `latest` the one that leaves last and does.
+    `by` is the time [s of the flow] before which a path must arrive; `latest` is the last path that does.
     """
 
     paths: tuple[Path, ...]
@@ -35,11 +36,11 @@ class Departures:
 
     @property
     def found(self) -> bool:
-        """Whether any departure has a path, one that arrives in time where that was asked for."""
+        """Whether any departure has a path; if `by` is set, whether any path arrives in time."""
         return self.best.found if self.by is None else self.latest is not None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: a row for each departure, the best and the latest."""
+        """Return a table for JSON: a row for each departure, the best path and the latest path."""
         rows = {"departures": [_row(path) for path in self.paths], "best": _row(self.best)}
         if self.by is None:
             return rows
@@ -71,11 +72,12 @@ def _row(path: Path) -> dict[str, Any]:
 def _line(path: Path) -> str:
     leaves = leaving(path)
     if not path.found:
-        return f"{_said(path, leaves)}no path: {path.why or 'none was found'}"
-    return f"{_said(path, leaves)}{_said(path, leaves + path.travel_time)}{path.travel_time / 3600:9.2f} h"
+        return f"{_moment_text(path, leaves)}no path: {path.why or 'none was found'}"
+    arrives = leaves + path.travel_time
+    return f"{_moment_text(path, leaves)}{_moment_text(path, arrives)}{path.travel_time / 3600:9.2f} h"
 
 
-def _said(path: Path, when: float) -> str:
+def _moment_text(path: Path, when: float) -> str:
     if path.departs is None:
         return f"{when:,.0f} s".ljust(22)
     stamp = path.departs.timestamp() + when - leaving(path)
@@ -83,12 +85,15 @@ def _said(path: Path, when: float) -> str:
 
 
 def leaving(path: Path) -> float:
-    """When a path leaves [s of the flow]; 0 in a flow that is the same at all times."""
+    """Return the time [s of the flow] at which a path leaves; 0 in a steady flow."""
     return 0.0 if path.departure is None else path.departure
 
 
 def seconds(moment: Moment, problem: Problem, name: str) -> float:
-    """A time in seconds of the flow; InputError where it is none, or a date and the flow has no calendar."""
+    """Return a time in seconds of the flow.
+
+    InputError if `moment` is not a time, or if it is a date and the flow has no calendar.
+    """
     try:
         value = float(moment)
     except ValueError:
@@ -111,11 +116,11 @@ def seconds(moment: Moment, problem: Problem, name: str) -> float:
 def when_to_leave(
     at: Callable[[float], Path], first: float, last: float, every: float | None, by: float | None = None
 ) -> Departures:
-    """The paths of departures from `first` to `last` [s], one `every` so many seconds.
+    """Return the paths of departures from `first` to `last` [s] with steps of `every` [s].
 
-    `at` finds the path of a departure. Where a path must arrive `by` a time, the latest departure that does is
-    looked for between the last of these that does and the next: closely, though where leaving later may arrive
-    earlier another may lie beyond.
+    `at` finds the path of one departure. If a path must arrive `by` a time, the latest departure is found by
+    halving: between the last departure of these that arrives in time and the next one. If a glider that leaves
+    later can arrive earlier, a still later departure may exist.
     """
     require(first <= last, f"the first departure must not lie after the last; got {first:g} and {last:g} s")
     step = (last - first) / COUNT if every is None else every

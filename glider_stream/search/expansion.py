@@ -1,4 +1,4 @@
-"""Expansion: the legs that leave a place, found when a search comes to it."""
+"""Expansion: finds the legs that leave a place when a search comes to the place."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -10,49 +10,55 @@ from ..kernels.edges import EDGE_COLUMNS, STATUS, TIME, Status
 from ..roadmap.problem import Problem
 
 MOST_REMEMBERED = 512
-"""Fans that a bounded expansion remembers, with some thousand legs each."""
+"""A bounded expansion remembers at most this many fans; each fan has some thousand legs."""
 
 
 class Fan(NamedTuple):
-    """Legs that leave one place at one time: to the places `target` (n,), rising; rows of `Edge` (n, 7)."""
+    """Legs that leave one place at one time: numbers of places `target` (n,), rising; `rows` of `Edge` (n, 7)."""
 
     target: Index
     rows: Array
 
 
 class Expansion(Protocol):
-    """Where legs come from; places are the nodes, then the goals that are none, then a start that is none."""
+    """The source of legs for a search.
+
+    The places are the nodes, then each goal that is not a node, then the start if it is not a node.
+    """
 
     @property
     def places(self) -> Array:
-        """Of all places (n, 3) [m]."""
+        """The positions of all places (n, 3) [m]."""
         ...
 
     @property
     def nodes(self) -> int:
-        """How many of the places are nodes, the first ones."""
+        """The number of nodes; the nodes are the first places."""
         ...
 
     @property
     def start(self) -> int:
-        """The place of the start."""
+        """The number of the start among the places."""
         ...
 
     @property
     def spent(self) -> bool:
-        """Whether it shall be asked no more: a search then ends where it is."""
+        """Whether no more fans may be asked for; the search then ends early."""
         ...
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
-        """The legs from some places, none twice, left at some times [s]; to others than those `wanted` or not.
+        """Return the legs from places `place` (n,) that begin at `time` (n,) [s]; no place occurs twice.
 
-        `place` (n,), `time` (n,), `wanted` (n, places).
+        `wanted` (n, places) marks the targets of use; legs to other targets may be left out.
         """
         ...
 
 
 class Ends(NamedTuple):
-    """The ends of a search: of the start and each goal, where it is (3,) [m] and the nodes there, often none."""
+    """The ends of a search: position (3,) [m] of the start and of each goal, and the nodes at each position.
+
+    Often no node lies there; then the array of nodes is empty.
+    """
 
     start: Array
     start_nodes: Index
@@ -61,13 +67,13 @@ class Ends(NamedTuple):
 
 
 class ClockExpansion:
-    """Legs as they are at the time at which they begin; with `frozen`, all as at the problem's departure.
+    """Finds each leg at the time at which it begins; with `frozen`, at the problem's departure.
 
-    No leg ends after the flow does; `cut` says whether any leg looked for might have.
+    No leg ends after the flow's last time. `cut` says whether any leg might have ended after it.
     """
 
     def __init__(self, problem: Problem, position: Array, ends: Ends, frozen: bool) -> None:
-        """Number the places; find from which nodes legs to a goal may come."""
+        """Number the places, and find the nodes from which a leg may lead to a goal."""
         self.problem, self.position, self.ends, self.frozen = problem, position, ends, frozen
         self.legs = problem.legs(position)
         self.new_goals = [n for n, nodes in enumerate(ends.goal_nodes) if not nodes.size]
@@ -81,23 +87,23 @@ class ClockExpansion:
 
     @property
     def places(self) -> Array:
-        """As Expansion says."""
+        """The positions of all places (n, 3) [m]."""
         return self._places
 
     @property
     def nodes(self) -> int:
-        """As Expansion says."""
+        """The number of nodes; the nodes are the first places."""
         return len(self.position)
 
     @property
     def start(self) -> int:
-        """As Expansion says."""
+        """The number of the start among the places."""
         nodes = self.ends.start_nodes
         return int(nodes[0]) if nodes.size else len(self._places) - 1
 
     @property
     def goals(self) -> list[Index]:
-        """The places of each goal."""
+        """The numbers of the places at each goal."""
         first = len(self.position)
         return [
             nodes if nodes.size else np.array([first + self.new_goals.index(n)])
@@ -106,11 +112,11 @@ class ClockExpansion:
 
     @property
     def spent(self) -> bool:
-        """As Expansion says: never."""
+        """Always False: this expansion has no limit."""
         return False
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
-        """As Expansion says."""
+        """Return the connected legs from places `place` (n,) that begin at `time` (n,) [s]; see `Expansion`."""
         nodes, flow = len(self.position), self.problem.evaluator.flow
         when = np.full(time.size, self.problem.departure) if self.frozen else time
         integration = self.problem.evaluator.integration
@@ -128,8 +134,8 @@ class ClockExpansion:
         return [_kept(fan, float(t), flow.extent.t_hi) for fan, t in zip(result, when, strict=True)]
 
     def _to_goals(self, place: Index, when: Array, wanted: Bools, result: list[Fan]) -> None:
-        """Add the legs to the goals that are no nodes, and from a start that is none to all."""
-        nodes, goals = len(self.position), np.array([int(one[0]) for one in self.goals], np.int64)
+        """Add the legs to goals that are not nodes; if the start is not a node, add its legs to all goals."""
+        nodes, goals = len(self.position), np.array([int(places[0]) for places in self.goals], np.int64)
         if not goals.size:
             return
         beside, column = goals >= nodes, np.maximum(goals - nodes, 0)
@@ -153,35 +159,35 @@ class ClockExpansion:
 
 
 class BoundedExpansion:
-    """A clock's expansion that is `spent` after `most` fans; it remembers the first for another search."""
+    """A `ClockExpansion` that is `spent` after `most` fans; it remembers the first fans for another search."""
 
     def __init__(self, clock: ClockExpansion, most: float) -> None:
-        """Nothing is remembered yet."""
+        """Begin with no remembered fan."""
         self.clock, self.most, self.found = clock, most, 0
         self.known: dict[tuple[int, float], tuple[Bools, Fan]] = {}
 
     @property
     def places(self) -> Array:
-        """As Expansion says."""
+        """The positions of all places (n, 3) [m]."""
         return self.clock.places
 
     @property
     def nodes(self) -> int:
-        """As Expansion says."""
+        """The number of nodes; the nodes are the first places."""
         return self.clock.nodes
 
     @property
     def start(self) -> int:
-        """As Expansion says."""
+        """The number of the start among the places."""
         return self.clock.start
 
     @property
     def spent(self) -> bool:
-        """As Expansion says."""
+        """Whether `most` fans have been found."""
         return self.found >= self.most
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
-        """As Expansion says."""
+        """Return the legs from places `place` (n,) that begin at `time` (n,) [s], remembered ones if possible."""
         asked = zip(place.tolist(), time.tolist(), wanted, strict=True)
         fans = [self._remembered(at, when, some) for at, when, some in asked]
         new = np.array([n for n, fan in enumerate(fans) if fan is None], np.int64)
@@ -195,13 +201,13 @@ class BoundedExpansion:
         return [fan for fan in fans if fan is not None]
 
     def _remembered(self, place: int, time: float, wanted: Bools) -> Fan | None:
-        """The fan of a place and a time, where it has at least the legs that are wanted."""
+        """Return the remembered fan of a place and a time [s]; None if it lacks legs that are wanted."""
         had, fan = self.known.get((place, time), (None, None))
         return None if had is None or bool((wanted & ~had).any()) else fan
 
 
 def _kept(fan: Fan, departure: float, last: float) -> Fan:
-    """Those that connect, and arrive before the flow ends."""
+    """Return the fan with only the legs that connect and arrive before the flow's last time `last` [s]."""
     with np.errstate(invalid="ignore"):
         fits = (fan.rows[:, STATUS] == Status.CONNECTED) & (departure + fan.rows[:, TIME] <= last)
     return Fan(fan.target[fits], fan.rows[fits])

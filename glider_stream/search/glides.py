@@ -1,4 +1,4 @@
-"""Glides that join given stops: the control of each leg, exact, and what its time changes by; many at once."""
+"""Exact glides between given stops: the control of each leg and the derivatives of its time, for many legs."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -13,24 +13,24 @@ from ..kernels.legs import fly_legs, legs_fit
 from ..roadmap.evaluator import Evaluator
 
 LEGS_AT_ONCE = 1024
-"""Legs that a thread flies at once, for some milliseconds: fewer would wait for threads to begin."""
+"""A thread flies this many legs at a time, which takes milliseconds; with fewer the threads' start costs more."""
 CLOSE = 1e-5
-"""A leg that ends this near its stop [m] is exact: hundreds of legs together then miss by no millimetre."""
+"""A leg that ends within this distance [m] of its stop is exact: hundreds of legs add up to a few millimetres."""
 MOST_STEPS = 12
-"""Newton steps from a guess; from a near one it takes two or three."""
+"""At most this many Newton steps are made from a guess; a near guess needs two or three."""
 LONGEST_TURN = 0.3
-"""A Newton step's most in glide angle and heading [rad]: beyond, the leg's linear model says nothing."""
+"""A Newton step changes glide angle and heading by at most this [rad]; beyond it the linear model is wrong."""
 X, Y, Z, T, Z_END, ANGLE, HEADING = range(7)
-"""What a leg's end depends on: start [m], departure [s], the height it ends at [m], its control [rad]."""
+"""The columns of a leg's parameters: start x, y, z [m], departure [s], height of its end [m], control [rad]."""
 STEPS = np.array([0.5, 0.5, 0.2, 1.0, 0.2, 2e-4, 2e-4])
-"""By how much each is changed to measure derivatives, forth and back: small beside the scale of currents, so that
-the differences are good to six digits, and far above rounding."""
+"""Each parameter is changed by this much, up and down, to measure derivatives. The steps are small against the
+scale of currents, so six digits of the differences are right, and large against rounding errors."""
 
 
 class Glides(NamedTuple):
-    """Exact legs between stops: magnitude of the glide angle, heading [rad] (n,), duration, departure [s] (n,).
+    """Legs between stops: size of the glide `angle`, `heading` [rad], duration `time`, departure `departs` [s].
 
-    `miss` (n,) [m]: how far from its stop a leg ends.
+    All arrays are (n,). `miss` [m] is the distance from its stop at which a leg ends.
     """
 
     angle: Array
@@ -41,14 +41,14 @@ class Glides(NamedTuple):
 
     @property
     def exact(self) -> NDArray[np.bool_]:
-        """Which legs (n,) end at their stops."""
+        """Mask (n,) of the legs that end at their stops."""
         return self.miss <= CLOSE
 
 
 class Slopes(NamedTuple):
-    """What a leg's time and control change by: `time` (n, 7) [s], glide `angle` and `heading` (n, 7) [rad].
+    """Derivatives of each leg's `time` (n, 7) [s] and of its glide `angle` and `heading` (n, 7) [rad].
 
-    By start x, y, z, end x, y, z [m] and departure [s].
+    The seven columns are the derivatives by start x, y, z, end x, y, z [m] and departure [s].
     """
 
     time: Array
@@ -58,14 +58,15 @@ class Slopes(NamedTuple):
 
 @dataclass(frozen=True)
 class Air:
-    """The water and the vehicle, for legs that join `begin` and `end` (n, 3) [m], n of them at once."""
+    """Computes legs from `begin` to `end` (n, 3) [m] in the water of an evaluator, n legs at once."""
 
     evaluator: Evaluator
 
     def glide(self, begin: Array, end: Array, angle: Array, heading: Array, departs: float | Array) -> Glides:
-        """The exact legs, from a guess of their controls [rad].
+        """Return the legs by Newton's method, from a guess of their controls (n,) [rad].
 
-        `departs` [s] of each (n,), or of the first of a route, whose every leg leaves when the last one arrives.
+        `departs` [s] is the departure of each leg (n,), or one number: the departure of the first leg of a route,
+        in which each leg leaves when the leg before it arrives.
         """
         angle, heading = angle.copy(), heading.copy()
         climbs = end[:, 2] > begin[:, 2]
@@ -90,9 +91,9 @@ class Air:
         return Glides(angle, heading, time, np.asarray(left), miss)
 
     def slopes(self, begin: Array, end: Array, glides: Glides, one_sided: bool = False) -> Slopes:
-        """The derivatives of exact legs, by flights beside them and the implicit function theorem.
+        """Return the derivatives of exact legs, by flights beside them and the implicit function theorem.
 
-        With `one_sided` by half the flights, and off by half a step: enough where two of them are compared.
+        `one_sided` uses half the flights and is less accurate; that is enough to compare two derivatives.
         """
         climbs = end[:, 2] > begin[:, 2]
         of = np.column_stack([begin, glides.departs, end[:, 2], glides.angle, glides.heading])
@@ -103,7 +104,7 @@ class Air:
             beside = [of + sign * _step(n) for n in range(7) for sign in (1.0, -1.0)]
             ends = self._ends(np.stack(beside), climbs)
             by = (ends[0::2] - ends[1::2]) / (2 * STEPS[:, None, None])  # (7, n, 2)
-        # a leg ends at its stop: what moves its end otherwise, the control takes back
+        # the leg must end at its stop, so the control undoes every other change of the leg's end
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
@@ -118,7 +119,7 @@ class Air:
         return Slopes(time, angle, control[..., 1])
 
     def aimed(self, begin: Array, end: Array, glides: Glides, slopes: Slopes, moved: Array) -> Glides:
-        """Legs to ends that have `moved` (n, 6) [m], to first order: guesses, which end near their stops."""
+        """Return guesses of legs, to first order, after their starts and ends have `moved` (n, 6) [m]."""
         climbs = end[:, 2] > begin[:, 2]
         lowest, highest = self.angles(climbs)
         angle = glides.angle + (slopes.angle[:, :6] * moved).sum(axis=1)
@@ -130,7 +131,7 @@ class Air:
         return Glides(angle, heading, time, glides.departs, np.zeros(len(angle)))
 
     def fit(self, begin: Array, end: Array, glides: Glides) -> NDArray[np.bool_]:
-        """Which legs (n,) stay in the flow and in open water."""
+        """Return a mask (n,) of the legs that stay in the flow and in open water."""
         fits = np.zeros(len(glides.time), np.bool_)
         start = np.column_stack([begin, glides.departs])
         through = self._through(glides.angle, glides.heading, end[:, 2] > begin[:, 2])
@@ -139,18 +140,18 @@ class Air:
         return fits
 
     def along(self, begin: Array, end: Array, glides: Glides, share: float) -> Array:
-        """Where legs are (n, 3) [m] after a share of their times."""
+        """Return the positions (n, 3) [m] of legs after a share of their vertical way."""
         climbs, height = end[:, 2] > begin[:, 2], begin[:, 2] + share * (end[:, 2] - begin[:, 2])
         of = np.column_stack([begin, glides.departs, height, glides.angle, glides.heading])
         return np.column_stack([self._ends(of[None], climbs)[0], height])
 
     def angles(self, climbs: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """The shallowest and the steepest glide of each leg [rad]."""
+        """Return the shallowest and the steepest glide angle of each leg, (n,) each [rad]."""
         way = climbs.astype(np.intp)
         return self.evaluator.polar.shallowest[way], self.evaluator.polar.steepest[way]
 
     def speed(self, angle: Array, climbs: NDArray[np.bool_]) -> Array:
-        """V [m/s] at glide angles [rad], as `kernels.control.glide_speed` has it."""
+        """Return the speed V (n,) [m/s] at glide angles [rad], equal to `kernels.control.glide_speed`."""
         polar, way = self.evaluator.polar, climbs.astype(np.intp)
         last = polar.speed.shape[1] - 1
         lowest, highest = self.angles(climbs)
@@ -160,7 +161,7 @@ class Air:
         return np.asarray(low + (at - below) * (polar.speed[way, below + 1] - low))
 
     def sinking(self, angle: Array, climbs: NDArray[np.bool_]) -> Array:
-        """The vertical speed [m/s], below 0 in a dive."""
+        """Return the vertical speed (n,) [m/s] at glide angles [rad]; it is negative in a dive."""
         return np.asarray(self.speed(angle, climbs) * np.sin(angle) * np.where(climbs, 1.0, -1.0))
 
     def _through(self, angle: Array, heading: Array, climbs: NDArray[np.bool_]) -> Array:
@@ -168,7 +169,7 @@ class Air:
         return np.stack([along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1)
 
     def _ends(self, of: Array, climbs: NDArray[np.bool_]) -> Array:
-        """Where legs of parameters (m, n, 7) end: (m, n, 2) [m]."""
+        """Return the ends x, y (m, n, 2) [m] of legs with parameters (m, n, 7)."""
         many = np.broadcast_to(climbs, of.shape[:2]).ravel()
         row = of.reshape(-1, 7)
         through = self._through(row[:, ANGLE], row[:, HEADING], many)
@@ -181,14 +182,14 @@ class Air:
 
 
 def _step(n: int) -> Array:
-    """The change of one of the seven that a leg's end depends on."""
+    """Return the step (7,) that changes only parameter `n` of a leg."""
     step = np.zeros(7)
     step[n] = STEPS[n]
     return step
 
 
 def _solve(by_first: Array, by_second: Array, off: Array) -> Array:
-    """The two unknowns (n, 2) with by_first * a + by_second * b = off, all (n, 2)."""
+    """Return the unknowns (a, b), (n, 2), of by_first * a + by_second * b = off; all inputs are (n, 2)."""
     det = by_first[:, 0] * by_second[:, 1] - by_second[:, 0] * by_first[:, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         a = (by_second[:, 1] * off[:, 0] - by_second[:, 0] * off[:, 1]) / det

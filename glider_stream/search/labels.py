@@ -1,11 +1,12 @@
-"""Labels: a search over ways, of which several to one place may each be worth going on with.
+"""Labels: a search that keeps several ways to one place if each of them may lead to the best route.
 
-A label is a place and what counts there: the time, and where asked for the cost, whether a climb would cost a
-turn, the half-yos since the last surfacing, and when that was. A label to which another at the same place is
-nowhere worse is dropped: whatever follows, the other does as well. That takes for granted that who leaves
-earlier arrives no later; where it does not hold, labels of different bins of time are kept side by side.
-Labels are taken by the least of what is asked for, what remains at least to the goal included (Hart, Nilsson
-and Raphael 1968; Martins 1984, On a multicriteria shortest path problem); each is expanded at its own time.
+A label holds a place and the values that matter there: the time, and if asked for the cost, whether a climb would
+cost a turn, the half-yos since the last surfacing, and the time of that surfacing. A label is dropped if another
+label at the same place is at least as good in every value, because every route on from it is then at least as
+good, too. This assumes that a glider that leaves earlier never arrives later. Where that is false, labels in
+different bins of time are kept side by side. The search always takes the label with the least sum of time or cost
+so far and a lower bound of the rest (Hart, Nilsson and Raphael 1968; Martins 1984, On a multicriteria shortest
+path problem). Each label is expanded at its time.
 """
 
 import heapq
@@ -24,17 +25,18 @@ from .path import SURFACE, Hop
 from .surfacing import Surfacing
 
 AT_ONCE, MOST_AT_ONCE = 16, 256
-"""Labels that are expanded together: at least so many, though one of them may better another; at most so many."""
+"""The least and the greatest number of labels that are expanded together. The least number is taken even if one
+of these labels may later be improved by another."""
 HOUR = 3600.0
 
 
 @dataclass(frozen=True)
 class Aim:
-    """What a search is for: the least time, or with `by_cost` the least cost; a cost below `cost_below`.
+    """The aim of a search: the least time, or with `by_cost` the least cost; the cost must be below `cost_below`.
 
-    With `front`, every way to the goal that no other beats in both. `bins` [s]: labels of different bins are
-    kept side by side; `latest` [s]: no label is later. `below`: ways that take as much, of what is made least
-    (the time at which they arrive, or the cost), are of no use.
+    With `front` the search finds every way to the goal for which no other way is better in both. Labels in
+    different `bins` [s] of time are kept side by side. No label is later than `latest` [s]. Ways whose arrival
+    [s], or cost if `by_cost`, is not less than `below` are dropped.
     """
 
     by_cost: bool = False
@@ -46,25 +48,25 @@ class Aim:
 
 
 class Bound(Protocol):
-    """What a way takes at the least; `sink` [m/s]: no glide changes its depth faster."""
+    """Lower bounds of the time and cost of a way."""
 
     @property
     def sink(self) -> float:
-        """As Bound says."""
+        """The greatest vertical speed of any glide [m/s]."""
         ...
 
     def between(self, place: int) -> Array:
-        """From one of the places to each (n,) [s]."""
+        """Return a lower bound of the time (n,) [s] from one place to each place."""
         ...
 
     def remaining(self, goals: Index, cost: Cost) -> tuple[Array, Array]:
-        """From each of the places to the nearest of some: (n,) [s], and (n,) in the cost's unit."""
+        """Return lower bounds from each place to the nearest goal: of time (n,) [s], and of cost (n,)."""
         ...
 
 
 @dataclass
 class Tally:
-    """What a search took: fans, the share of all places that were expanded, batches, labels that were kept."""
+    """The effort of a search: fans, the share of all nodes that were expanded, batches, labels that were kept."""
 
     fans: int = 0
     share: float = 0.0
@@ -74,9 +76,9 @@ class Tally:
 
 @dataclass
 class Label:
-    """A way to a place: `time` [s], `cost`, whether a climb costs a turn, half-yos, the last surfacing [s].
+    """A way to a place: its `time` [s] and `cost`, whether a climb costs a turn, half-yos, last surfacing [s].
 
-    `before` is the number of the label that it continues by the leg `row`, a row of `Edge`.
+    The way continues the label with the number `before` by the leg `row`, which is a row of `Edge`.
     """
 
     place: int
@@ -91,9 +93,9 @@ class Label:
 
 
 class LabelSearch:
-    """A search over the legs of an expansion, from its start; `labels` holds all that were kept, by number.
+    """A search over the legs of an expansion, from its start; `labels` holds all labels that were kept.
 
-    `whole`: it did not end because the expansion was spent.
+    `whole` is False if the search ended because the expansion was spent.
     """
 
     def __init__(
@@ -106,7 +108,7 @@ class LabelSearch:
         departure: float,
         aim: Aim,
     ) -> None:
-        """Prepare a search to any of the places `goals`, to all places where there are none."""
+        """Prepare a search to any of the places `goals`; if `goals` is empty, to all places."""
         self.expansion, self.rule, self.bound, self.aim = expansion, rule, bound, aim
         places = expansion.places
         self.height, self.up = places[:, 2], places[:, 2] >= -SURFACE
@@ -138,7 +140,7 @@ class LabelSearch:
         self._keep(first, self._criteria(first.place, departure, 0.0, True, 0, departure))
 
     def settled(self) -> Iterator[int]:
-        """The labels as they become final, the goals' among them; each that is no goal's is then expanded."""
+        """Yield the numbers of labels when they become final; a label that is not at a goal is then expanded."""
         while self.queue:
             _, _, _, number = heapq.heappop(self.queue)
             label = self.labels[number]
@@ -158,7 +160,7 @@ class LabelSearch:
                 self._relax(number, self._fan(number))
 
     def hops(self, number: int) -> list[Hop]:
-        """The legs that lead to a label."""
+        """Return the legs that lead from the start to a label."""
         found: list[Hop] = []
         places, label = self.expansion.places, self.labels[number]
         while label.row is not None:
@@ -176,7 +178,7 @@ class LabelSearch:
         self, place: "Index | int", time: "Array | float", cost: "Array | float", turns: "Bools | bool",
         half: "Index | int", surfaced: "Array | float",
     ) -> Array:  # fmt: skip
-        """What counts of labels, (columns,) or (n, columns): less is better in each."""
+        """Return the values by which labels are compared, (columns,) or (n, columns); less is better in each."""
         columns: list[Array | float] = [time]
         if self.priced:
             columns += [cost, np.asarray(turns, np.float64)]
@@ -190,7 +192,7 @@ class LabelSearch:
         return np.stack(np.broadcast_arrays(*columns), axis=-1).astype(np.float64)
 
     def _wanted(self, label: Label) -> Bools:
-        """The places to which a leg from a label may be of use, by what it takes at the least."""
+        """Return a mask of the places to which a leg from a label may be useful, by lower bounds of the leg."""
         least = self.bound.between(label.place)
         time, cost = label.time + least, label.cost + self.per_leg + self.per_second * least
         wanted = (self.height != self.height[label.place]) & (time <= self.aim.latest)
@@ -205,12 +207,12 @@ class LabelSearch:
         return np.asarray(wanted)
 
     def _fan(self, number: int) -> Fan:
-        """The legs of a label; those of the labels that follow are found with them."""
+        """Return the legs of a label; the legs of the labels that follow are found together with them."""
         if number not in self.fans:
             batch = self._batch(number)
             labels = [self.labels[n] for n in batch]
-            place, time = np.array([one.place for one in labels]), np.array([one.time for one in labels])
-            wanted = np.array([self._wanted(one) for one in labels])
+            place, time = np.array([label.place for label in labels]), np.array([label.time for label in labels])
+            wanted = np.array([self._wanted(label) for label in labels])
             self.fans.update(zip(batch, self.expansion.fans(place, time, wanted), strict=True))
             self.expanded[place] = True
             self.tally.fans += len(batch)
@@ -219,9 +221,9 @@ class LabelSearch:
         return self.fans.pop(number)
 
     def _batch(self, number: int) -> list[int]:
-        """A label and some that follow it: what they are now they stay if no leg is short enough to better them.
+        """Return a label and some labels that follow it and that no leg is short enough to improve.
 
-        A few are taken all the same, so that all threads have work. Which, depends on nothing but the search.
+        At least `AT_ONCE` labels are taken, so that all threads have work. The choice depends only on the search.
         """
         first = self.labels[number]
         chosen, seen, earliest = [number], {first.place}, first.time
@@ -245,7 +247,7 @@ class LabelSearch:
         return chosen
 
     def _relax(self, number: int, fan: Fan) -> None:
-        """Go on from a label by its legs."""
+        """Make new labels from a label and the legs that leave it."""
         label, rows, to = self.labels[number], fan.rows, fan.target
         climbs = rows[:, GLIDE_ANGLE] > 0
         time, cost = label.time + rows[:, TIME], label.cost + rows[:, COST]
@@ -264,7 +266,7 @@ class LabelSearch:
         criteria = self._criteria(to, time, cost, ~climbs, half, surfaced)
         fits &= ~_any_beats(self.best[to], criteria)
         for n in np.flatnonzero(fits):
-            # a fan may hold two legs to one place: its own, and that from end to end
+            # a fan may hold two legs to one place: one of the roadmap and the direct leg from start to goal
             if np.all(self.best[to[n]] <= criteria[n], axis=1).any():
                 continue
             new = Label(
@@ -274,7 +276,7 @@ class LabelSearch:
             self._keep(new, criteria[n])
 
     def _keep(self, label: Label, criteria: Array) -> None:
-        """Put a label in its place, and drop those that it beats."""
+        """Keep a label at its place, and drop the labels that are worse."""
         place, number = label.place, len(self.labels)
         beaten = (criteria <= self.best[place]).all(axis=1)
         for other in self.holder[place][beaten & (self.holder[place] >= 0)]:
@@ -291,12 +293,12 @@ class LabelSearch:
         self.tally.labels += 1
         key = self._key(label)
         if self.is_goal[place] and not self.aim.front:
-            # others may tie with the best so far, none of them is better
+            # other labels may be as good as the best so far, but no better
             self.below = min(self.below, key + 1e-9)
         heapq.heappush(self.queue, (key, label.time, place, number))
 
 
 def _any_beats(held: Array, criteria: Array) -> Bools:
-    """Whether any row held at each place (n, m, columns) is nowhere worse than what comes (n, columns)."""
+    """Return a mask (n,): does any held row (n, m, columns) beat or equal the new row (n, columns) everywhere?"""
     nowhere_worse = np.all(held <= criteria[:, None, :], axis=2)
     return np.asarray(np.any(nowhere_worse, axis=1), np.bool_)

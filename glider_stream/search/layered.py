@@ -17,10 +17,13 @@ from .trade_off import TradeOff
 
 
 class SurfacingPlanner(Planner):
-    """A planner whose paths keep a rule: a node stands once for each state of what is left until a surfacing."""
+    """A planner whose paths keep a rule of surfacing.
+
+    Each node is repeated once for every state. A state says how much of the rule's limits is used up.
+    """
 
     def __init__(self, roadmap: Roadmap, problem: Problem, rule: Surfacing) -> None:
-        """As Planner; the roadmap's nodes are repeated, state by state."""
+        """Check the roadmap as `Planner` does, and repeat its nodes for each state."""
         self.base = roadmap
         super().__init__(_layered(roadmap, rule), problem, rule)
 
@@ -29,7 +32,7 @@ class SurfacingPlanner(Planner):
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
     ) -> TradeOff:
-        """As RoutePlanner; hours count as they are, not in parts."""
+        """Return every path for which no other is better both in time and in energy; hours are not rounded."""
         return Planner(self.base, self.problem, self.rule).front(start, goal)
 
     def _start(self, point: ArrayLike | None) -> End:
@@ -59,7 +62,7 @@ class SurfacingPlanner(Planner):
         return nodes, place
 
     def _reached(self, start: Array) -> tuple[Array, Array]:
-        """As Planner; a node is reached in whichever of its states is reached first."""
+        """Return the nodes' positions (n, 3) [m], and the earliest time (n,) [s] of any of their states."""
         return self.base.position, self.arrivals(start).reshape(-1, len(self.base.position)).min(axis=0)
 
     def _on_base(self) -> Legs:
@@ -67,7 +70,7 @@ class SurfacingPlanner(Planner):
 
 
 def _onward(rule: Surfacing, position: Array, used: Index, nodes: Index, outcomes: Array) -> tuple[Index, Index]:
-    """Of legs to `nodes`, from a state `used` (2,): the states that they end in, and which keep the rule."""
+    """Return the states in which legs to `nodes` end that begin in state `used` (2,), and which keep the rule."""
     turns, parts = rule.steps(int(used[0]), outcomes[:, GLIDE_ANGLE], outcomes[:, TIME])
     after = np.stack([used[0] + turns, used[1] + parts])
     counts = np.array(rule.counts)
@@ -78,7 +81,7 @@ def _onward(rule: Surfacing, position: Array, used: Index, nodes: Index, outcome
 
 
 def _layered(road: Roadmap, rule: Surfacing) -> Roadmap:
-    """A roadmap with each node once for each state, and the edges that keep the rule."""
+    """Return a roadmap that has each node once for each state, and only the edges that keep the rule."""
     nodes, states = len(road.position), int(np.prod(rule.counts))
     source = np.repeat(np.arange(nodes), np.diff(road.indptr))
     rows = np.column_stack([np.full(road.target.size, Status.CONNECTED), road.time, road.cost, road.glide_angle])

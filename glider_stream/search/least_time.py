@@ -1,10 +1,10 @@
-"""Least times: a bound below the time of any way between two places, from the flow's greatest speeds.
+"""Least times: a lower bound of the time of any way between two places, from the greatest speeds of the flow.
 
-Along a direction d a glider gets on no faster than Vh + M, with Vh its best horizontal speed and M the greatest
-current along d on the line across d that it is passing. So the time from a to b is at least the integral of
-ds / (Vh + M(s)) between their places on d: a difference of two potentials, one for each direction. The depth
-bounds it likewise: |dz| over the greatest vertical speed. A difference of potentials obeys the triangle
-inequality, so the remaining time that it gives never falls faster along a leg than the clock runs.
+Along a direction d a glider moves no faster than Vh + M. Vh is its best horizontal speed. M is the greatest
+current along d on the line across d that the glider passes. So the time from a to b is at least the integral of
+ds / (Vh + M(s)) between their places on d. This is a difference of two potentials; each direction gives one
+bound. The depth gives another bound: |dz| over the greatest vertical speed. A difference of potentials obeys the
+triangle inequality, so along a leg the bound of the remaining time never falls faster than the clock runs.
 """
 
 import math
@@ -21,25 +21,25 @@ from ..water.inspect import is_steady
 
 DIRECTIONS = 16
 CELLS = 64
-"""Along the longer side of the water in which the greatest currents are looked for."""
+"""The longer side of the water in which the greatest currents are searched has this many cells."""
 STEADY, PERIODIC = (25, 1), (5, 24)
-"""Heights and times at which a flow is read that is given by a formula: steady, and with a period."""
+"""(Heights, times) at which a flow given by a formula is read: a steady flow, and a flow with a period."""
 SLOWEST = 1e-6
-"""A line across which no glider gets on takes so long [m/s]."""
+"""The least speed [m/s] that the bound assumes across a line that no glider can pass."""
 SPARE = 0.02
-"""What may lie between the points at which a formula is read, in greatest speeds of the flow."""
+"""The current between the points at which a formula is read may be higher by this share of the greatest speed."""
 
 
 def fastest_sink(polar: Polar) -> float:
-    """The greatest vertical speed of any glide [m/s]."""
+    """Return the greatest vertical speed of any glide [m/s]."""
     return max(float(vertical_speed(polar, way, polar.steepest[way])) for way in (DIVE, CLIMB))
 
 
 class GreatestSpeeds:
-    """How fast a glider gets on at the most, along each direction and in depth, in a flow from some time on."""
+    """The greatest speed of a glider along each direction and in depth, in a flow from some time on."""
 
     def __init__(self, problem: Problem, position: Array, since: float) -> None:
-        """Look at the water in which gliders may pass between nodes (n, 3) [m], from `since` [s] on."""
+        """Read the flow where gliders may pass between nodes (n, 3) [m], from the time `since` [s] on."""
         flow, polar = problem.evaluator.flow, problem.evaluator.polar
         self.through = float(polar.best_horizontal.max())
         self.sink = fastest_sink(polar)
@@ -56,44 +56,47 @@ class GreatestSpeeds:
         ]
 
     def _scale(self, at: Array, fastest: Array, size: float) -> tuple[Array, Array]:
-        """Places [m] on a direction, and the least time [s] from the first of them; cells lie `at` (nx, ny)."""
+        """Return places [m] on a direction, and the least time [s] from the first place to each.
+
+        `at` (nx, ny) [m] are the places of the cells on that direction, `fastest` (nx, ny) [m/s] their currents.
+        """
         first = float(np.min(at)) - 2 * size
         strip = ((at - first) / size).astype(np.int64)
         speed = np.full(int(strip.max()) + 3, -np.inf)
         np.maximum.at(speed, strip.ravel(), fastest.ravel())
-        # a cell is up to 1.42 strips wide: what is known of a strip holds for those beside it
+        # a cell is up to 1.42 strips wide, so the speed of a strip also counts in the strips beside it
         rate = np.maximum(self.through + maximum_filter(speed, 3), SLOWEST)
         time: Array = np.concatenate([[0.0], np.cumsum(size / rate)])
         edges: Array = first + size * np.arange(speed.size + 1.0)
         return edges, time
 
     def potentials(self, places: Array) -> Array:
-        """Of places (n, 3) [m], for each direction (n, directions) [s]; beyond the water no time passes."""
+        """Return the potentials (n, directions) [s] of places (n, 3) [m]; outside the water they are constant."""
         along = places[:, :2] @ self.directions
         return np.stack([np.interp(along[:, n], *scale) for n, scale in enumerate(self.scales)], axis=1)
 
 
 def least_cost(speeds: GreatestSpeeds, start: Array, goal: Array, cost: Cost) -> float:
-    """A bound below the cost of every route between two points (3,) [m]: its turns are not counted."""
+    """Return a lower bound of the cost of every route between two points (3,) [m]; turns are not counted."""
     left = LeastTimes(speeds, np.stack([start, goal])).remaining(np.array([1]), cost)[1]
     return float(left[0])
 
 
 class LeastTimes:
-    """Bounds below the times between places (n, 3) [m]."""
+    """Lower bounds of the times between places (n, 3) [m]."""
 
     def __init__(self, speeds: GreatestSpeeds, places: Array) -> None:
-        """Of some places, whatever the way between them."""
+        """Compute the potentials of the places."""
         self.sink, self.height = speeds.sink, places[:, 2].copy()
         self.potential = speeds.potentials(places)
 
     def between(self, place: int) -> Array:
-        """From one of the places to each (n,) [s]."""
+        """Return a lower bound of the time (n,) [s] from one place to each place."""
         ahead = (self.potential - self.potential[place]).max(axis=1)
         return np.asarray(np.maximum(ahead, np.abs(self.height - self.height[place]) / self.sink))
 
     def remaining(self, goals: Index, cost: Cost) -> tuple[Array, Array]:
-        """From each of the places to the nearest of some: (n,) [s], and in the cost's unit, without turns."""
+        """Return lower bounds (n,) from each place to the nearest goal: time [s], and cost without turns."""
         left = np.full(self.height.size, np.inf)
         for goal in goals:
             ahead = (self.potential[goal] - self.potential).max(axis=1)
@@ -105,7 +108,7 @@ class LeastTimes:
 
 
 def _box(flow: kernel.Flow, problem: Problem, position: Array) -> tuple[Array, Array]:
-    """The water [m] in which gliders may pass: no leg strays further from its ends than half its reach."""
+    """Return the box [m] in which gliders may pass: a leg stays within half its reach of its ends."""
     evaluator = problem.evaluator
     horizon = evaluator.integration.dt * evaluator.integration.steps
     stray = 0.5 * (float(evaluator.polar.best_horizontal.max()) + flow.extent.max_speed) * horizon
@@ -117,14 +120,15 @@ def _box(flow: kernel.Flow, problem: Problem, position: Array) -> tuple[Array, A
 def greatest(
     flow: kernel.Flow, x: Array, y: Array, size: float, z: tuple[float, float], since: float, directions: Array
 ) -> Array:
-    """The greatest current (directions, nx, ny) [m/s] along `directions` (2, n), from a time on, in each cell.
+    """Return the greatest current (directions, nx, ny) [m/s] along `directions` (2, n) in each cell.
 
-    Cells of a `size` [m] about x, y; all heights of `z` [m].
+    The cells have the middles x, y and the side `size` [m]. All heights within `z` [m] and all times from `since`
+    [s] on count.
     """
     if isinstance(flow, kernel.OceanGrid):
         return _of_grid(flow, x, y, size, z, since, directions)
     period = 0.0 if is_steady(flow) else getattr(flow, "period", None)
-    if period is None:  # no set of moments tells all
+    if period is None:  # the flow has neither a period nor a grid, so no set of times is enough
         return np.full((directions.shape[1], x.size, y.size), flow.extent.max_speed)
     heights, moments = PERIODIC if period else STEADY
     finer = (np.concatenate([side - size / 4, side + size / 4]) for side in (x, y))
@@ -149,7 +153,7 @@ def _of_grid(
     since: float,
     directions: Array,
 ) -> Array:
-    """Exact: what is interpolated lies between the grid's values, so the greatest of those in reach counts."""
+    """Return the same for a grid; it is a true bound, because interpolation stays between the grid's values."""
     first = max(int(np.searchsorted(flow.times, since, side="right")) - 1, 0)
     low = max(int(np.searchsorted(flow.levels, z[0], side="right")) - 1, 0)
     high = int(np.searchsorted(flow.levels, z[1], side="left")) + 1
@@ -158,9 +162,9 @@ def _of_grid(
         for level in moment:
             known = np.maximum(known, np.moveaxis(level @ directions, -1, 0))
     near = _indices(flow, x, y)
-    # how many indices a cell spans: their map is smooth
+    # the number of indices that a cell spans; the map of indices is smooth
     moved = _indices(flow, x + size, y), _indices(flow, x, y + size)
-    span = max(float(np.abs(there - near).max()) for there in moved)
+    span = max(float(np.abs(index - near).max()) for index in moved)
     width = 2 * (math.ceil(span) + 1) + 1
     wide: Array = maximum_filter(known, (1, width, width))
     i, j = (np.clip(np.round(near[n]).astype(np.int64), 0, flow.values.shape[2 + n] - 1) for n in range(2))
@@ -168,6 +172,6 @@ def _of_grid(
 
 
 def _indices(flow: kernel.OceanGrid, x: Array, y: Array) -> Array:
-    """Fractional grid indices (2, nx, ny) at places [m], held at the rim."""
+    """Return fractional grid indices (2, nx, ny) at places [m]; outside the grid they stay at its edge."""
     at = np.meshgrid((x - flow.extent.x_lo) * flow.per_x, (y - flow.extent.y_lo) * flow.per_y, indexing="ij")
     return np.stack([map_coordinates(flow.index_map[..., n], at, order=1, mode="nearest") for n in range(2)])

@@ -1,4 +1,4 @@
-"""What polishing cannot do by small steps: legs cut and joined, yos put in and taken out."""
+"""The changes of a route that polishing cannot make by small steps: cut and join legs, add and remove yos."""
 
 import math
 from dataclasses import dataclass
@@ -10,29 +10,29 @@ from .glides import Glides
 from .polish import Chain, Polisher
 
 CUT_PAYS = 1e-3
-"""Cutting every leg of a route in two must gain such a share of its cost: pilots and vehicles like few legs."""
+"""Cutting each leg of a route in two must gain this share of its cost, because pilots prefer few legs."""
 JOIN_COSTS = 1e-4
-"""A stop under water that is no turn is taken out where that costs a smaller share than this."""
+"""A stop under water that is not a turn is removed if that raises the cost by a smaller share than this."""
 MOST_CUTS = 2
-"""How often all legs are cut in two at most."""
+"""All legs are cut in two at most this many times."""
 MOST_LEGS = 400
-"""A route of more legs is not cut, and its yos are not counted anew: each try takes seconds."""
+"""A route with more legs is not cut and keeps its number of yos, because each try takes seconds."""
 MOST_COUNTS = 12
-"""Numbers of yos that are tried at most."""
+"""At most this many numbers of yos are tried."""
 MOST_SINGLE = 24
-"""A route of more legs gets no single yos: its number of yos is found for the whole of it."""
+"""A route with more legs gets no single yos; its number of yos is found for the whole route."""
 MOST_TRIES = 24
-"""Single yos that are tried at most."""
+"""At most this many single yos are tried."""
 TRIAL_MOVES = 6
-"""Newton steps for each barrier that a route which is only tried is given."""
+"""A route that is only tried gets at most this many Newton steps for each barrier."""
 YO_PAYS = 1e-3
-"""A single yo must gain such a share."""
+"""A single yo must gain this share of the cost."""
 PAYS = 1e-5
-"""Another number of yos must gain such a share."""
+"""Another number of yos must gain this share of the cost."""
 
 
 def improve(polisher: Polisher, chain: Chain) -> Chain:
-    """The route polished, with as many yos and cuts as pay; never one that costs more."""
+    """Return the polished route, with as many yos and cuts as pay; it never costs more than the old one."""
     best = polisher.polish(chain)
     if len(best.glides.time) > MOST_LEGS:
         return best
@@ -50,7 +50,7 @@ def improve(polisher: Polisher, chain: Chain) -> Chain:
 
 
 def _with_more_yos(polisher: Polisher, chain: Chain) -> Chain:
-    """The route with yos put into single legs, the longest first, as long as one pays."""
+    """Return the route with yos added to single legs, the longest leg first, until no yo pays."""
     tries = 0
     while tries < MOST_TRIES:
         for leg in np.argsort(-chain.glides.time, kind="stable").tolist():
@@ -67,12 +67,13 @@ def _with_more_yos(polisher: Polisher, chain: Chain) -> Chain:
 
 
 def _zigzag(polisher: Polisher, chain: Chain, leg: int) -> Chain | None:
-    """The route with a small way back in the middle of a leg, polished; None where that cannot be flown."""
+    """Return the route with a small yo in the middle of a leg, polished; None if it cannot be flown."""
     glides, (begin, end) = chain.glides, chain.stops[leg : leg + 2]
-    one = slice(leg, leg + 1)
-    of = Glides(*(values[one] for values in glides))
+    here = slice(leg, leg + 1)
+    of = Glides(*(values[here] for values in glides))
     ahead, back = (
-        polisher.air.along(chain.stops[one], chain.stops[leg + 1 : leg + 2], of, share)[0] for share in (0.4, 0.6)
+        polisher.air.along(chain.stops[here], chain.stops[leg + 1 : leg + 2], of, share)[0]
+        for share in (0.4, 0.6)
     )
     rise = end[2] - begin[2]
     way_back = math.copysign(max(0.2 * abs(rise), 1.2 * polisher.least_rise), rise)
@@ -88,9 +89,9 @@ def _zigzag(polisher: Polisher, chain: Chain, leg: int) -> Chain | None:
 
 
 def _best_count(polisher: Polisher, chain: Chain) -> Chain:
-    """The route with the number of yos that costs least, looked for by single yos from the likeliest number."""
+    """Return the route with the best number of yos; the search begins at a likely number, with steps of one."""
     if len(turns(chain.stops)) < len(chain.stops) - 2:
-        return chain  # some stops are no turns: its legs are cut already
+        return chain  # some stops are not turns, so its legs are cut already
     tried: dict[int, Chain | None] = {len(chain.glides.time): chain}
 
     def route(legs: int) -> Chain | None:
@@ -105,9 +106,9 @@ def _best_count(polisher: Polisher, chain: Chain) -> Chain:
         at = likely
     for way in (2, -2):
         while True:
-            here, there = tried[at], route(at + way)
-            assert here is not None
-            if there is None or there.cost > (1 - PAYS) * here.cost:
+            now, other = tried[at], route(at + way)
+            assert now is not None
+            if other is None or other.cost > (1 - PAYS) * now.cost:
                 break
             at += way
     found = tried[at]
@@ -115,7 +116,7 @@ def _best_count(polisher: Polisher, chain: Chain) -> Chain:
 
 
 def _likely_legs(polisher: Polisher, chain: Chain) -> float:
-    """How many legs the route would have were each as steep as the fastest glide in still water."""
+    """Return the number of legs of the route if each leg were as steep as the fastest glide in still water."""
     polar = polisher.problem.evaluator.polar
     climbs = np.diff(chain.stops[:, 2]) > 0
     fastest = np.abs(polisher.air.sinking(polar.best_angle[climbs.astype(np.intp)], climbs))
@@ -123,14 +124,14 @@ def _likely_legs(polisher: Polisher, chain: Chain) -> float:
 
 
 def turns(stops: Array) -> Index:
-    """Which stops between start and goal are turns from dive to climb, or back."""
+    """Return the numbers of the inner stops at which a dive becomes a climb, or a climb becomes a dive."""
     climbs = np.diff(stops[:, 2]) > 0
     return np.asarray(1 + np.flatnonzero(climbs[1:] != climbs[:-1]), np.int64)
 
 
 @dataclass(frozen=True)
 class _Track:
-    """A route as functions of the time since it began [s]."""
+    """A route as functions of the time [s] since it began."""
 
     clock: Array
     stops: Array
@@ -139,7 +140,7 @@ class _Track:
 
     @classmethod
     def of(cls, polisher: Polisher, chain: Chain) -> "_Track":
-        """Of a route; the current is what a leg's glide alone does not explain of its way."""
+        """Make the track of a route; the current is the part of a leg's way that its glide does not explain."""
         glides, way = chain.glides, np.diff(chain.stops[:, :2], axis=0)
         climbs = np.diff(chain.stops[:, 2]) > 0
         along = polisher.air.speed(glides.angle, climbs) * np.cos(glides.angle)
@@ -148,18 +149,18 @@ class _Track:
         return cls(clock, chain.stops, 0.5 * (clock[1:] + clock[:-1]), way / glides.time[:, None] - through)
 
     def places(self, at: Array) -> Array:
-        """x, y [m] at times (n,)."""
+        """Return x, y (n, 2) [m] at times (n,) [s]."""
         return np.stack([np.interp(at, self.clock, self.stops[:, n]) for n in range(2)], axis=1)
 
     def carried(self, at: Array) -> Array:
-        """The mean current [m/s] of legs about times (n,)."""
+        """Return the mean current (n, 2) [m/s] of the legs around times (n,) [s]."""
         return np.stack([np.interp(at, self.middle, self.current[:, n]) for n in range(2)], axis=1)
 
 
 def _respaced(polisher: Polisher, chain: Chain, legs: int) -> Chain | None:
-    """The route with another number of legs, of even times along its track, polished; None where none flies.
+    """Return the route with another number of legs, polished; None if it cannot be flown.
 
-    Tops and bottoms keep the depths that they have thereabouts.
+    The legs begin with equal times along the old track. Tops and bottoms keep the depths of the old ones nearby.
     """
     track, old = _Track.of(polisher, chain), chain.stops
     clock = np.linspace(0.0, track.clock[-1], legs + 1)
@@ -182,7 +183,7 @@ def _respaced(polisher: Polisher, chain: Chain, legs: int) -> Chain | None:
 
 
 def _cut(polisher: Polisher, chain: Chain) -> Chain | None:
-    """The route with every leg cut in the middle, where it passes, and polished."""
+    """Return the polished route after each leg was cut at the middle of its path; None if it cannot be flown."""
     glides, count = chain.glides, len(chain.glides.time)
     stops = np.empty((2 * count + 1, 3))
     stops[::2] = chain.stops
@@ -192,15 +193,15 @@ def _cut(polisher: Polisher, chain: Chain) -> Chain | None:
 
 
 def _joined(polisher: Polisher, chain: Chain) -> Chain:
-    """The route without the stops that are no turns and hardly gain anything."""
+    """Return the route without the stops that are not turns and gain almost nothing."""
     stop = 1
     while stop < len(chain.stops) - 1:
         rise = np.diff(chain.stops[stop - 1 : stop + 2, 2])
         if rise[0] * rise[1] > 0 and not polisher.stays(chain.stops[stop]):
             glides = chain.glides
             angle, heading = np.delete(glides.angle, stop), np.delete(glides.heading, stop)
-            one, other = glides.heading[stop - 1], glides.heading[stop]
-            heading[stop - 1] = one + 0.5 * math.remainder(other - one, math.tau)
+            before, after = glides.heading[stop - 1], glides.heading[stop]
+            heading[stop - 1] = before + 0.5 * math.remainder(after - before, math.tau)
             angle[stop - 1] = 0.5 * (glides.angle[stop - 1] + glides.angle[stop])
             fewer = polisher.chain(np.delete(chain.stops, stop, axis=0), angle, heading)
             if fewer is not None and fewer.cost < (1 + JOIN_COSTS) * chain.cost:

@@ -1,4 +1,4 @@
-"""Paths: legs from a start to a goal, for people and programs, and back out of a path file."""
+"""Paths: legs from a start to a goal, as text for people, as JSON for programs, and read from a path file."""
 
 import json
 import math
@@ -18,24 +18,26 @@ from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
 
 MOST_TEXT = 200_000_000
-"""The most that a path file may hold [bytes]; a route of a thousand legs has some five million."""
+"""A path file may hold at most this many bytes; a route of a thousand legs takes some five million."""
 LARGEST = 1e12
-"""A number [m, s] in a path file beyond it is no place or time on Earth."""
+"""A larger number [m, s] in a path file cannot be a place or time on Earth."""
 SURFACE = 10.0
-"""A leg that ends no deeper [m] ends at the surface."""
+"""A leg that ends at this depth [m] or above it counts as a leg to the surface."""
 FROZEN = "FROZEN: every leg meets the current of the departure, so these times and places do not hold"
-"""What every output says of a path whose clock does not run."""
+"""Every output says this about a path whose clock does not run."""
 Hop = tuple[Array, Array, Edge]
-"""A leg as searches have it: from, to (3,) [m], and the edge between them."""
+"""A leg in a search: its start and end (3,) [m], and the edge between them."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One glide, with one trim: from `start` to `end` (3,) [m]; the nodes it was planned between.
+    """One glide with constant trim, planned from the node `start` to the node `end` (3,) [m].
 
-    `depart` [s] since the path began; `trajectory` rows [t, x, y, z] end at the closest approach, `miss` [m].
-    Where the scenario is geographic: `lonlat` (2, 2) [degrees] of start and end, `track` (m, 2) of the
-    trajectory, and `north` [rad], true north counter-clockwise from the frame's +y. `cost`: its own.
+    `glide_angle` (positive in a climb) and `heading` are in rad, `speed` in m/s. `depart` [s] counts from the
+    begin of the path; `duration` in s. `trajectory` has rows [t, x, y, z] and ends at the closest approach to
+    `end`, at the distance `miss` [m]. In a geographic scenario `lonlat` (2, 2) [degrees] are start and end,
+    `track` (m, 2) [degrees] is the trajectory, and `north` [rad] is the direction of true north,
+    counter-clockwise from the frame's +y. `cost` is the cost of this leg.
 
     Examples:
         >>> leg = road.query().legs[0]
@@ -65,7 +67,7 @@ class Leg:
         return math.degrees(math.pi / 2 + self.north - self.heading) % 360
 
     def as_dict(self) -> dict[str, Any]:
-        """As the path file has it."""
+        """Return the table that is written to the path file."""
         return {
             "from": self.start.tolist(),
             "to": self.end.tolist(),
@@ -79,13 +81,13 @@ class Leg:
         }
 
     def told(self, departs: datetime | None) -> str:
-        """A line for people; of a path that `departs` (UTC) then, if that is known."""
+        """Return a line for people; `departs` is the path's departure (UTC), if that is known."""
         way, glide = "climb" if self.glide_angle > 0 else "dive ", math.degrees(self.glide_angle)
         # a geographic scenario speaks of depths, any other of heights
         begin, end = (z if self.lonlat is None else 0.0 - z for z in (self.start[2], self.end[2]))
-        there = "" if self.lonlat is None else "  at {:.4f}, {:.4f}".format(*self.lonlat[1])
+        place = "" if self.lonlat is None else "  at {:.4f}, {:.4f}".format(*self.lonlat[1])
         return (
-            f"{moment(departs, self.depart):>9}  {way} {begin:7.0f} m to {end:6.0f} m{there}  "
+            f"{moment(departs, self.depart):>9}  {way} {begin:7.0f} m to {end:6.0f} m{place}  "
             f"glide {glide:6.1f} deg  compass {self.compass:5.1f} deg  "
             f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
         )
@@ -93,10 +95,10 @@ class Leg:
 
 @dataclass(frozen=True)
 class Round:
-    """A round of refinement: new nodes every `spacing` [m] where they could help, the best route then.
+    """A round of refinement: new nodes every `spacing` [m] where they could help, and the best route after it.
 
-    `nodes` that were searched, the new ones among them, and `edges` between them; `travel_time` [s] and `cost` of
-    the best route so far; `gain`, the share of the cost that the round saved.
+    `nodes` and `edges` are the numbers that the round searched, with the new ones. `travel_time` [s] and `cost`
+    belong to the best route so far. `gain` is the share of the cost that the round saved.
     """
 
     spacing: float
@@ -107,7 +109,7 @@ class Round:
     gain: float
 
     def as_dict(self) -> dict[str, Any]:
-        """As the path file has it."""
+        """Return the table that is written to the path file."""
         return {
             "spacing_m": self.spacing,
             "nodes": self.nodes,
@@ -118,7 +120,7 @@ class Round:
         }
 
     def told(self, number: int) -> str:
-        """A line for people."""
+        """Return a line for people."""
         return (
             f"  round {number}: nodes every {self.spacing:,.0f} m where they could help, {self.nodes:,} in all: "
             f"{span(self.travel_time)}, {self.gain:.2%} gained"
@@ -127,16 +129,16 @@ class Round:
 
 @dataclass(frozen=True)
 class Path:
-    """The cheapest path of a query, or the honest no: `found`, `travel_time` [s], `cost`, `legs`.
+    """The cheapest path of a query from `start` to `goal` (3,) [m], or the answer that no path was found.
 
-    From `start` to `goal` (3,) [m]; `lonlat` (2, 2) [degrees] of both where the scenario is geographic;
-    `departs` (UTC) where it says when. `unit` of the cost, s or J; `why` there is none, and `why_not`, the same
-    for JSON, if that is known; `notes` on files written of it. `departure` [s]: the flow's time at which it
-    begins, None in a steady flow; `frozen`: every leg meets the current of that time, whenever it begins.
-    `expanded`: the share of the nodes from which the search looked for legs, where it did.
-    `unthinned`: how many legs and seconds it had before it was thinned; `unpolished`: how many legs, seconds and
-    what cost before it was polished. `rounds` of refinement that led to it;
-    `least`: a bound below the cost of every route, known from the greatest currents.
+    `cost` has the `unit` s or J; it is inf if no path was found. `lonlat` (2, 2) [degrees] are start and goal in
+    a geographic scenario. `departs` is the date of departure (UTC), if known. `why` says why no path was found,
+    and `why_not` says the same for JSON, if known. `notes` belong to the files that are written from the path.
+    `departure` [s] is the flow's time at which the path begins; None in a steady flow. `frozen`: every leg meets
+    the current of that time. `expanded` is the share of the nodes at which the search looked for legs, if it did.
+    `unthinned` are the number of legs and the time [s] before thinning. `unpolished` are the number of legs, the
+    time [s] and the cost before polishing. `rounds` are the rounds of refinement. `least` is a lower bound of the
+    cost of every route, from the greatest currents.
 
     Examples:
         >>> path = road.query()
@@ -166,13 +168,13 @@ class Path:
 
     @property
     def clock_runs(self) -> bool:
-        """Whether each leg meets the current of the time at which it begins; all are alike in a steady flow."""
+        """Whether each leg meets the current of the time at which it begins; False in a steady flow."""
         return self.departure is not None and not self.frozen
 
     def water_times(self, leg: Leg, departure: float) -> Array:
-        """The times [s] (m,) of the flow at which a leg's rows were flown; if frozen all from the departure.
+        """Return the flow's times (m,) [s] of a leg's rows; if frozen, each leg begins at the departure.
 
-        `departure` is that of a path which does not say its own.
+        `departure` [s] is used if the path has no departure.
         """
         since = leg.trajectory[:, 0]
         begins = departure if self.departure is None else self.departure
@@ -180,21 +182,21 @@ class Path:
 
     @property
     def found(self) -> bool:
-        """Whether there is a path."""
+        """Whether a path was found."""
         return math.isfinite(self.cost)
 
     @property
     def travel_time(self) -> float:
-        """Time from start to goal [s]; inf where there is no path."""
+        """The time from start to goal [s]; inf if no path was found."""
         return sum((leg.duration for leg in self.legs), 0.0) if self.found else math.inf
 
     @property
     def trajectory(self) -> Array:
-        """All legs' rows [t, x, y, z], (m, 4)."""
+        """The rows [t, x, y, z] of all legs, (m, 4)."""
         return np.concatenate([np.empty((0, 4)), *(leg.trajectory for leg in self.legs)])
 
     def as_dict(self) -> dict[str, Any]:
-        """As the path file has it."""
+        """Return the table that is written to the path file."""
         energy = {"energy_j": self.cost} if self.found and self.unit == "J" else {}
         thinned = {}
         if self.unthinned is not None:
@@ -206,7 +208,7 @@ class Path:
             **energy,
             **thinned,
             **self._before_polishing(),
-            **({"rounds": [one.as_dict() for one in self.rounds]} if self.rounds else {}),
+            **({"rounds": [item.as_dict() for item in self.rounds]} if self.rounds else {}),
             **self._against_the_best(),
             **({} if self.departure is None else {"departure_s": self.departure, "frozen": self.frozen}),
             **({} if self.expanded is None else {"expanded_share": self.expanded}),
@@ -224,7 +226,7 @@ class Path:
 
     @property
     def likely_gain(self) -> float | None:
-        """What another round of refinement might save, a share of the cost: an estimate, as much as the last."""
+        """The share of the cost that another round of refinement may save: an estimate, the gain of the last."""
         return self.rounds[-1].gain if self.rounds else None
 
     def _against_the_best(self) -> dict[str, Any]:
@@ -237,7 +239,7 @@ class Path:
         return None if not self.least else self.cost / self.least - 1
 
     def _told_against_the_best(self) -> list[str]:
-        """A line for people: how far from the best the route may be."""
+        """Return a line for people that says how far the route may be from the best one."""
         over = self._over_least()
         if over is None or self.least is None:
             return []
@@ -268,13 +270,13 @@ class Path:
             title += f", {cost / 1000:,.1f} kJ" if self.unit == "J" else ""
         if self.frozen:
             title += f"; {FROZEN}"
-        rounds = [one.told(n) for n, one in enumerate(self.rounds, 1)]
+        rounds = [item.told(n) for n, item in enumerate(self.rounds, 1)]
         lines = [f"  {leg.told(self.departs)}" for leg in self.legs]
         return "\n".join([title, *rounds, *lines, *self._told_against_the_best()])
 
 
 def hops_of(path: Path) -> list[Hop]:
-    """The legs of a path as `fly` takes them."""
+    """Return the legs of a path in the form that `fly` takes."""
     return [
         (
             leg.start,
@@ -303,12 +305,12 @@ def load_path(file: str | File) -> Path:
         require(bool((np.diff(clock) >= 0).all()), "the times of its trajectory do not rise from 0")
         require(bool(clock[-1] > 0), "it takes no time")
     except (OSError, ValueError, RecursionError) as error:
-        said = f"it is no JSON text, {error}"
+        reason = f"it is no JSON text, {error}"
         if isinstance(error, OSError):
-            said = (error.strerror or "it is no file").lower()
+            reason = (error.strerror or "it is no file").lower()
         elif isinstance(error, InputError):
-            said = str(error)
-        raise InputError(f"the path file {file} cannot be read: {said}; write it with `query -o`") from None
+            reason = str(error)
+        raise InputError(f"the path file {file} cannot be read: {reason}; write it with `query -o`") from None
     departure = float(_numbers(table, "departure_s", "the path")) if "departure_s" in table else None
     frozen = table.get("frozen") is True
     return Path(legs[0].start, legs[-1].end, cost, legs, departure=departure, frozen=frozen)
@@ -334,7 +336,7 @@ def _numbers(table: dict[str, Any], key: str, where: str, *shape: int | None) ->
     fits = values.ndim == len(shape) and all(
         have == want or (want is None and have > 0) for have, want in zip(values.shape, shape, strict=True)
     )
-    said = " x ".join("n" if size is None else str(size) for size in shape) or "one"
+    count = " x ".join("n" if size is None else str(size) for size in shape) or "one"
     fits = fits and float(np.abs(values).max()) <= LARGEST  # False for NaN, too
-    require(fits, f"`{key}` of {where} must be finite numbers, {said} of them")
+    require(fits, f"`{key}` of {where} must be finite numbers, {count} of them")
     return values

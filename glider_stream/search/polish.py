@@ -1,9 +1,10 @@
-"""Polishing: a route's stops moved, its legs cut and its yos counted anew, until nothing near is quicker.
+"""Polishing: moves a route's stops, cuts its legs and changes its number of yos, until no route near is better.
 
-A route is its stops: the leg between two of them is the one exact glide that joins them, whose time is a smooth
-function T(p, q, t) of its ends and its departure. The cost of the route is the sum of its legs', each of which
-leaves when the last one arrives, and Newton's method makes it least: its second derivatives are blocks along
-the diagonal, since a stop meets two legs alone. Every iterate is a route that can be flown.
+A route is defined by its stops. The leg between two stops is the exact glide that joins them. Its time is a
+smooth function T(p, q, t) of its ends and its departure. The cost of the route is the sum of the costs of its
+legs; each leg leaves when the leg before it arrives. Newton's method makes this cost least. The second
+derivatives are blocks along the diagonal, because a stop touches only two legs. Every step of the method is a
+route that can be flown.
 """
 
 import math
@@ -22,34 +23,38 @@ from .glides import Air, Glides, Slopes
 from .path import Hop, Path
 
 LEAST_RISE = 0.05
-"""A polished leg dives or climbs at least so much of the domain's depth, or SHORTER of the shortest leg that the
-route had: else a route would hold the depth of the best current by ever smaller yos, which no vehicle flies."""
+"""A polished leg changes its depth by at least this share of the domain's depth, or by SHORTER times the smallest
+change of depth in the old route. Without this limit a route would stay at the depth of the best current by very
+small yos, which no vehicle flies."""
 SHORTER = 0.5
+"""See LEAST_RISE."""
 BARRIERS = (1e-4, 5e-6)
-"""Weights, in turn, of the barrier that keeps legs off the ends of the glide polar, of the horizon and
-of the least rise, in shares of the route's cost: it moves an optimum away from such an end by about so much."""
+"""The weights of the barrier, one after the other, in shares of the route's cost. The barrier keeps legs away
+from the ends of the glide polar, from the horizon and from the least rise. It moves an optimum away from such a
+limit by about this share."""
 NEARER = 0.1
-"""In one step a leg comes nearer to such an end to this share of its distance at most."""
+"""One step may reduce the distance of a leg to such a limit at most to this share of it."""
 CURVED = (20.0, 20.0, 8.0)
-"""By how much a stop is moved to measure second derivatives, along x, y, z [m]: wide enough to look over
-the kinks of a grid, where first derivatives bend."""
+"""A stop is moved by this much along x, y, z [m] to measure second derivatives. The step is wide enough to pass
+over the kinks of a grid, where first derivatives jump."""
 ENOUGH = 3e-5
-"""A step that gains a smaller share of the cost is a small one."""
+"""A step that gains a smaller share of the cost counts as small."""
 SMALL_STEPS = 2
-"""So many small steps, one after the other, are the last ones: a single one may lie at a kink."""
+"""Polishing ends after this many small steps in a row; a single small step may come from a kink."""
 MOST_MOVES = 30
+"""At most this many steps are made for each barrier."""
 SHORTENED = 6
-"""How often a step is halved where its route cannot be flown or gains nothing."""
+"""A step is shortened at most this many times if its route cannot be flown or gains nothing."""
 DAMPED, FREED = 10.0, 0.1
-"""Factors of the damping where a step fails, and where it does not."""
+"""The damping is multiplied by the first factor after a step that fails, and by the second after any other."""
 STIFF = 1e3
-"""Damping that moves nothing any more."""
+"""With this damping a step moves almost nothing, so polishing ends."""
 FAR = 0.5
-"""A stop moves at most so much of the longer of its legs in one step."""
+"""In one step a stop moves at most by this share of the longer of its two legs."""
 
 
 class Chain(NamedTuple):
-    """A route as it is polished: stops (n + 1, 3) [m], the legs between them, its cost."""
+    """A route in polishing: its stops (n + 1, 3) [m], the n legs between them, its cost."""
 
     stops: Array
     glides: Glides
@@ -58,10 +63,11 @@ class Chain(NamedTuple):
 
 @dataclass(frozen=True)
 class Polisher:
-    """Makes routes of a problem better.
+    """Improves the routes of a problem.
 
-    `stays` says of a stop whether it keeps its depth; `frozen`: every leg meets the current of the departure;
-    `single_yos`: whether yos may be put into single legs, with a top under water; `least_rise` [m] of a leg.
+    `stays` says whether a stop (3,) [m] keeps its depth. `frozen`: every leg meets the current of the departure.
+    `single_yos`: yos with a top under water may be added to single legs. `least_rise` [m] is the least change of
+    depth of a leg.
     """
 
     problem: Problem
@@ -72,37 +78,37 @@ class Polisher:
 
     @classmethod
     def of(cls, problem: Problem, path: Path, **how: Any) -> "Polisher":
-        """With the least rise that fits a path."""
+        """Make a polisher with the least rise that fits a path."""
         shortest = min(abs(float(leg.end[2] - leg.start[2])) for leg in path.legs)
         depth = float(problem.hi[2] - problem.lo[2])
         return cls(problem, least_rise=min(LEAST_RISE * depth, SHORTER * shortest), **how)
 
     @property
     def air(self) -> Air:
-        """The legs."""
+        """The object that computes legs."""
         return Air(self.problem.evaluator)
 
     def glide(self, stops: Array, angle: Array, heading: Array) -> Glides:
-        """The legs between stops, each leaving when the last one arrives, or all alike if frozen."""
+        """Return the legs between stops; each leaves when the one before arrives, if frozen at the departure."""
         departs = self.problem.departure
         left = np.full(len(angle), departs) if self.frozen else departs
         return self.air.glide(stops[:-1], stops[1:], angle, heading, left)
 
     def chain(self, stops: Array, angle: Array, heading: Array) -> Chain | None:
-        """The route through stops, from a guess of its controls; None where it cannot be flown."""
+        """Return the route through stops, from a guess of its controls (n,) [rad]; None if it cannot be flown."""
         glides = self.glide(stops, angle, heading)
         if not (glides.exact.all() and self._within(stops, glides).all()):
             return None
         return Chain(stops, glides, self.cost(stops, glides))
 
     def chain_of(self, path: Path) -> Chain | None:
-        """A path as it is polished: its legs end exactly, each leaves when the last one arrives."""
+        """Return a path as a chain with exact legs; None if it cannot be flown."""
         stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)])
         angle = np.array([abs(leg.glide_angle) for leg in path.legs])
         return self.chain(stops, angle, np.array([leg.heading for leg in path.legs]))
 
     def hops(self, chain: Chain) -> list[Hop]:
-        """The legs of a route, for a path to be made of."""
+        """Return the legs of a route in the form from which a path is made."""
         stops, glides, price = chain.stops, chain.glides, self.problem.evaluator.cost.kernel()
         climbs = np.diff(stops[:, 2]) > 0
         speed = self.air.speed(glides.angle, climbs)
@@ -116,13 +122,13 @@ class Polisher:
         return legs
 
     def cost(self, stops: Array, glides: Glides) -> float:
-        """The scenario's own cost of a route, its turns included."""
+        """Return the scenario's cost of a route, with the cost of its turns."""
         price = self.problem.evaluator.cost.kernel()
         legs = price.per_second * float(glides.time.sum()) + price.per_leg * len(glides.time)
         return legs + float(self._pumped(stops[:-1, 2])[self._turns(stops)].sum())
 
     def polish(self, chain: Chain, moves: int = MOST_MOVES) -> Chain:
-        """Newton's method on the stops between start and goal, at most so many moves for each barrier."""
+        """Improve the stops between start and goal by Newton's method, with at most `moves` steps per barrier."""
         first = chain
         for weight in BARRIERS:
             damping, small = 1e-3, 0
@@ -134,10 +140,10 @@ class Polisher:
                 small = small + 1 if abs(gain) < ENOUGH * chain.cost else 0
                 if small == SMALL_STEPS:
                     break
-        return min(first, chain, key=lambda one: one.cost)  # the barrier may have moved it the wrong way
+        return min(first, chain, key=lambda route: route.cost)  # the barrier may have made it worse
 
     def _step(self, chain: Chain, weight: float, damping: float) -> tuple[Chain | None, float]:
-        """A Newton step, damped as far as it must be: a better route, if there is one, and the next damping."""
+        """Make a Newton step; return a better route, None if no damping gives one, and the next damping."""
         step = _Step.of(self, chain, weight)
         while damping < STIFF:
             better = self._along(chain, step, step.move(damping), weight)
@@ -147,12 +153,15 @@ class Polisher:
         return None, damping
 
     def merit(self, chain: Chain, weight: float) -> float:
-        """The cost and the barrier."""
+        """Return the cost of a route plus its barrier."""
         room, _ = self._room(chain.stops, chain.glides, None)
         return chain.cost - weight * float(np.log(room).sum())
 
     def _along(self, chain: Chain, step: "_Step", move: Array, weight: float) -> Chain | None:
-        """A better route along a move of the stops (n + 1, 3); stops whose legs cannot be flown move less."""
+        """Return a better route along a move (n + 1, 3) [m] of the stops; None if no part of the move gives one.
+
+        Stops whose legs cannot be flown move less.
+        """
         before, share = self.merit(chain, weight), np.ones(len(chain.stops))
         room = self._room(chain.stops, chain.glides, None)[0]
         for _ in range(SHORTENED):
@@ -160,7 +169,7 @@ class Polisher:
             stops = np.where((share > 0)[:, None], stops, chain.stops)
             shift = stops - chain.stops
             turned = np.diff(stops[:, 2]) * np.diff(chain.stops[:, 2]) <= 0
-            if turned.any():  # a leg is no dive any more, or no climb
+            if turned.any():  # a dive has become a climb, or a climb a dive
                 share = np.where(_at_ends(turned), 0.4 * share, share)
                 continue
             both = np.concatenate([shift[:-1], shift[1:]], axis=1)
@@ -183,7 +192,7 @@ class Polisher:
         return stops
 
     def _within(self, stops: Array, glides: Glides) -> NDArray[np.bool_]:
-        """Which legs (n,) may be flown: in water, within the horizon, neither too short nor turned round."""
+        """Return a mask (n,) of the legs that may be flown: in open water, within the horizon, not too short."""
         integration = self.problem.evaluator.integration
         short = np.abs(np.diff(stops[:, 2])) < self.least_rise
         late = glides.time > integration.dt * integration.steps
@@ -192,7 +201,7 @@ class Polisher:
         return self.air.fit(stops[:-1], stops[1:], glides) if fits.all() else np.asarray(fits, np.bool_)
 
     def _room(self, stops: Array, glides: Glides, slopes: Slopes | None) -> tuple[Array, Array]:
-        """How far legs are from what they must keep (n, 4), in shares; its slopes (n, 4, 6) by their ends."""
+        """Return how far legs are from their four limits (n, 4), as shares, and its slopes (n, 4, 6) by ends."""
         rise = np.diff(stops[:, 2])
         climbs = rise > 0
         lowest, highest = self.air.angles(climbs)
@@ -217,7 +226,7 @@ class Polisher:
         return np.maximum(room, 0.0) + 1e-7, by
 
     def _turns(self, stops: Array) -> NDArray[np.bool_]:
-        """At which legs' starts (n,) a dive turns into a climb; a route begins as if it had dived."""
+        """Return a mask (n,) of the legs that climb after a dive; a route begins as if it had dived."""
         climbs = np.diff(stops[:, 2]) > 0
         return np.asarray(climbs & ~np.concatenate([[False], climbs[:-1]]), np.bool_)
 
@@ -227,7 +236,7 @@ class Polisher:
 
 
 def _at_ends(legs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The stops (n + 1,) that some of the legs (n,) join."""
+    """Return a mask (n + 1,) of the stops at the ends of the marked legs (n,)."""
     at = np.zeros(len(legs) + 1, np.bool_)
     at[:-1] |= legs
     at[1:] |= legs
@@ -236,9 +245,10 @@ def _at_ends(legs: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class _Step:
-    """Gradient (n - 1, 3) and second derivatives, banded, of a route's cost by its inner stops; what is free.
+    """Derivatives of a route's cost by its inner stops: `gradient` (n - 1, 3), and second derivatives as a band.
 
-    `longest` (n - 1,) [m] is how far stops may move, `slopes` are those of the legs.
+    `free` (n - 1, 3) marks the coordinates that may move, `longest` (n - 1,) [m] is how far stops may move, and
+    `slopes` are the derivatives of the legs.
     """
 
     gradient: Array
@@ -249,11 +259,11 @@ class _Step:
 
     @classmethod
     def of(cls, polisher: Polisher, chain: Chain, weight: float) -> "_Step":
-        """Of a route, with a barrier of this weight."""
+        """Compute the derivatives of a route, with a barrier of this weight."""
         stops, glides = chain.stops, chain.glides
         slopes = polisher.air.slopes(stops[:-1], stops[1:], glides)
         price = polisher.problem.evaluator.cost.kernel().per_second
-        # what a second's delay at each leg's end costs: the legs after it leave later
+        # the cost of one second of delay at each leg's end: the legs after it leave later
         late = np.zeros(len(glides.time) + 1)
         for n in range(len(glides.time) - 1, -1, -1):
             by_delay = 0.0 if polisher.frozen else slopes.time[n, 6]
@@ -268,7 +278,7 @@ class _Step:
         leg[:, 2] += np.where(turns, (up - down) / 2, 0.0)
         gradient = leg[1:, :3] + leg[:-1, 3:]
         size = gradient.size
-        band = np.zeros((6, size))  # as solveh_banded takes a lower one
+        band = np.zeros((6, size))  # the lower band, in the form of solveh_banded
         count = len(gradient)
         for n in range(count):
             block = bent[n, 3:, 3:] + bent[n + 1, :3, :3]
@@ -290,20 +300,20 @@ class _Step:
 
     @staticmethod
     def _curvature(polisher: Polisher, stops: Array, glides: Glides, slopes: Slopes) -> Array:
-        """Second derivatives (n, 6, 6) of each leg's time by its own ends, by differences of the first."""
+        """Return second derivatives (n, 6, 6) of each leg's time by its ends, from differences of the first."""
         ends, count = np.concatenate([stops[:-1], stops[1:]], axis=1), len(stops) - 1
         rise, climbs = np.abs(np.diff(stops[:, 2])), np.diff(stops[:, 2]) > 0
         moved, steps = np.tile(ends, (6, 1, 1)), np.empty((6, count))
         for n in range(6):
             steps[n] = CURVED[n % 3]
             if n % 3 == 2:
-                # a leg is moved apart, not together: it stays a dive or a climb
+                # the ends move apart in depth, not together, so a dive stays a dive and a climb a climb
                 steps[n] = np.where(climbs == (n == 5), 1.0, -1.0) * np.minimum(steps[n], 0.2 * rise)
             moved[n, :, n] += steps[n]
-        there = moved[..., :3].reshape(-1, 3), moved[..., 3:].reshape(-1, 3)
-        # the leg itself and the six beside it, alike: what their first derivatives are off by cancels
+        shifted = moved[..., :3].reshape(-1, 3), moved[..., 3:].reshape(-1, 3)
+        # the leg and the six beside it are computed alike, so the errors of their first derivatives cancel
         all_begin, all_end = (
-            np.concatenate([one, six]) for one, six in zip((stops[:-1], stops[1:]), there, strict=True)
+            np.concatenate([at, six]) for at, six in zip((stops[:-1], stops[1:]), shifted, strict=True)
         )
         repeated = Glides(*(np.tile(values, 7) for values in glides))
         wide = Slopes(*(np.tile(values, (7, 1)) for values in slopes))
@@ -315,7 +325,7 @@ class _Step:
         return np.asarray(0.5 * (bent + bent.transpose(0, 2, 1)))
 
     def move(self, damping: float) -> Array:
-        """The step (n + 1, 3) [m] of all stops; longer ones are cut."""
+        """Return the step (n + 1, 3) [m] of all stops; steps that are too long are shortened."""
         band, free = self.band.copy(), self.free.ravel()
         gradient = np.where(free, self.gradient.ravel(), 0.0)
         for n in range(1, 6):

@@ -1,4 +1,4 @@
-"""Queries: Dijkstra over a roadmap, a start and a goal attached to it."""
+"""Queries: Dijkstra's algorithm over a roadmap, with a start and a goal attached to it."""
 
 import math
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 
 @dataclass(frozen=True)
 class End:
-    """An end of a query: its `point` (3,) [m], the nodes that lie there, often none, else its legs."""
+    """An end of a query: its `point` (3,) [m] and the nodes at that point; `legs` if no node lies there."""
 
     point: Array
     nodes: Index
@@ -42,23 +42,24 @@ class End:
 
 @dataclass(frozen=True)
 class Blend:
-    """What a search makes least: `cost` times the scenario's own cost, and `time` times seconds."""
+    """The sum that a search makes least: `cost` times the scenario's cost, plus `time` times the seconds."""
 
     cost: float = 1.0
     time: float = 0.0
 
     def of(self, cost: Any, time: Any) -> Any:
-        """The sum of legs."""
+        """Return the sum for legs with these costs and times [s]."""
         if self == Blend():
-            return cost  # what most queries ask for, of all edges
+            return cost  # most queries use this case, for all edges
         return self.cost * cost + self.time * time
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The cheapest ways from a start: the number, cost and predecessor of every state, the start's the last.
+    """The cheapest ways from a start: the cost and the predecessor `before` of every state.
 
-    A state is a node, where turns are free; else a node and how it was come to, by a dive or by a climb.
+    If turns are free, a state is a node. Otherwise a node has two states: reached by a dive, reached by a climb.
+    The last state is a start that is not a node; `origin` is the state of the start.
     """
 
     start: End
@@ -69,7 +70,7 @@ class _Search:
 
 
 class Planner(RoutePlanner):
-    """Answers queries from one roadmap; any number, from any number of threads; the roadmap is left as it is.
+    """Answers any number of queries from one roadmap, also from several threads; the roadmap is not changed.
 
     Examples:
         >>> planner = glider_stream.Planner(road.roadmap, road.problem)
@@ -83,7 +84,7 @@ class Planner(RoutePlanner):
         problem: Problem,
         rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> None:
-        """Check that flow and glider are those that the roadmap was built with."""
+        """Check that the roadmap was built with the problem's flow, terrain and glider."""
         check_unchanged(roadmap, problem)
         check_steps(roadmap, problem)
         self.roadmap = roadmap
@@ -97,10 +98,10 @@ class Planner(RoutePlanner):
         goal: ArrayLike | None = None,
         blend: Blend = Blend(),
     ) -> Path:
-        """The cheapest path between two points (3,) [m]; the scenario's own start and goal where None.
+        """Return the cheapest path between two points (3,) [m]; None stands for the scenario's start or goal.
 
-        A point that is a node is used as it is; any other is attached by its own neighbours, and the leg
-        from end to end is looked at, too. `blend` makes another sum the least.
+        A point that is a node is used directly. Any other point is attached to its neighbours, and the direct leg
+        from start to goal is tried, too. `blend` says which sum of cost and time is made least.
         """
         path = self.queries(start, [goal], blend)[0]
         if path.found:
@@ -114,14 +115,14 @@ class Planner(RoutePlanner):
         goals: Sequence[ArrayLike | None],
         blend: Blend = Blend(),
     ) -> list[Path]:
-        """The cheapest paths from a point (3,) [m] to each of many, as `query` finds them, by one search."""
+        """Return the cheapest paths from one point (3,) [m] to each of many, as `query` does, by one search."""
         search = self._search(self._start(start), blend)
         ends = [self._goal(goal) for goal in goals]
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
 
     def arrivals(self, start: ArrayLike | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s]; inf where it cannot."""
+        """Return the earliest time (n,) [s] at which each node is reached from a point; inf if it never is."""
         search = self._search(self._start(start), Blend(0.0, 1.0))
         nodes = len(self.roadmap.position)
         return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
@@ -131,7 +132,7 @@ class Planner(RoutePlanner):
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
     ) -> TradeOff:
-        """As RoutePlanner."""
+        """Return every path for which no other is better both in time and in energy, sorted by time."""
         rule = self.rule
         begin, end = self._start(start), self._goal(goal)
         for place, name in ((begin.point, "start"), (end.point, "goal")):
@@ -139,7 +140,7 @@ class Planner(RoutePlanner):
         if np.array_equal(begin.point, end.point):
             return TradeOff((self._path(begin.point, end.point, []),))
         direct = self._direct(begin, [end])[0]
-        legs = [None if one.legs is None else Fan(one.legs.nodes, one.legs.outcomes) for one in (begin, end)]
+        legs = [None if at.legs is None else Fan(at.legs.nodes, at.legs.outcomes) for at in (begin, end)]
         ends = RoadmapEnds(begin.point, end.point, begin.nodes, end.nodes, legs[0], legs[1], direct)
         expansion, evaluator, departure = RoadmapExpansion(self.roadmap, ends), self.problem.evaluator, 0.0
         left = LeftInRoadmap(expansion, fastest_sink(evaluator.polar))
@@ -151,19 +152,19 @@ class Planner(RoutePlanner):
         return TradeOff(tuple(self._path(begin.point, end.point, search.hops(n)) for n in found))
 
     def _reached(self, start: Array) -> tuple[Array, Array]:
-        """The nodes' places (n, 3) [m], and when each can be reached from a start at the soonest (n,) [s]."""
+        """Return the nodes' positions (n, 3) [m], and the earliest time (n,) [s] at which each is reached."""
         return self.roadmap.position, self.arrivals(start)
 
     def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
-        """As RoutePlanner."""
+        """Return the fastest path that costs at most `most_cost`; if no path does, it says why."""
         return self.front(start, goal).within(most_cost)
 
     def leaving(self, since: float) -> "Planner":
-        """The planner itself: its legs are the same at any time."""
+        """Return this planner: its legs are the same at any time."""
         return self
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
-        """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
+        """Return the costs (n, m) of the cheapest paths from n points (3,) [m] to m others; else inf."""
         ends = [self._goal(goal) for goal in goals]
         costs = np.empty((len(starts), len(goals)))
         for row, start in zip(costs, starts, strict=True):
@@ -175,7 +176,7 @@ class Planner(RoutePlanner):
 
     @property
     def _turns(self) -> Array | None:
-        """What a turn from dive to climb costs at each node, and at the start; None where turns are free."""
+        """The cost (n,) of a turn from dive to climb at each node; None if turns are free."""
         return self.problem.evaluator.cost.inflection(self.roadmap.position[:, 2])
 
     def _turn(self, search: _Search, z: float) -> float:
@@ -183,7 +184,7 @@ class Planner(RoutePlanner):
         return 0.0 if cost is None else search.blend.cost * float(cost)
 
     def _alone(self, search: _Search, leg: Edge) -> float:
-        """The cost of the leg from end to end; inf where there is none. It begins after a dive, as it were."""
+        """Return the cost of the direct leg, inf if it does not exist; its start counts as the end of a dive."""
         if leg.status != Status.CONNECTED:
             return math.inf
         turn = self._turn(search, search.start.point[2]) if leg.glide_angle > 0 else 0.0
@@ -202,16 +203,16 @@ class Planner(RoutePlanner):
         return End(place, nodes, None if nodes.size else _connected(self._legs.towards(place)))
 
     def _place(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
-        """The nodes that lie at an end of the query, often none, and where it is."""
+        """Return the nodes at an end of the query (often the array is empty), and its position (3,) [m]."""
         place = placed_end(self.problem, point, named, name)
         return nodes_at(self.roadmap.position, place), place
 
     @cached_property
     def _graph(self) -> tuple[Index | slice, NDArray[np.int32], NDArray[np.int32], Array | None]:
-        """The edge behind each way between states, the state it leads to, each state's first way, its turn.
+        """The graph of states: the edge of each way, its target state, each state's first way, the turn's cost.
 
-        The turn's cost is that of a climb from a state that was come to by a dive. There is room for the
-        ways of one more state, a start.
+        A way costs a turn if it climbs from a state that was reached by a dive. The arrays have room for the ways
+        of one more state, the start.
         """
         road, turns, nodes = self.roadmap, self._turns, len(self.roadmap.position)
         room = np.empty(nodes, np.int32)
@@ -228,7 +229,7 @@ class Planner(RoutePlanner):
         return ways, target, np.append(first, 0).astype(np.int32), turn
 
     def _costs(self, blend: Blend) -> Array:
-        """The cost of each way, with room for a start's; the last blend's is kept for the next query."""
+        """Return the cost of each way, with room for a start's ways; later queries use the same result."""
         if self._kept is None or self._kept[0] != blend:
             ways, _, _, turn = self._graph
             cost = blend.of(self.roadmap.cost, self.roadmap.time)[ways]
@@ -238,11 +239,11 @@ class Planner(RoutePlanner):
 
     @property
     def _phases(self) -> int:
-        """How many states a node has."""
+        """The number of states of a node."""
         return 1 if self._graph[3] is None else 2
 
     def _search(self, start: End, blend: Blend) -> _Search:
-        """Dijkstra's algorithm from a start; one at a time, since each writes its own ways into shared arrays."""
+        """Search from a start; only one search runs at a time, because each writes into the shared arrays."""
         with self._turn_by_turn:
             return self._dijkstra(start, blend)
 
@@ -253,19 +254,19 @@ class Planner(RoutePlanner):
         origin = int(start.nodes[0]) * self._phases if start.nodes.size else states
         if start.legs is not None:
             rows, to = start.legs.outcomes, start.legs.nodes
-            own, climbs = blend.of(rows[:, COST], rows[:, TIME]), rows[:, GLIDE_ANGLE] > 0
+            costs, climbs = blend.of(rows[:, COST], rows[:, TIME]), rows[:, GLIDE_ANGLE] > 0
             last += to.size
             pump = self.problem.evaluator.cost.inflection(start.point[2])
             if turn is not None and pump is not None:
-                own, to = own + blend.cost * np.where(climbs, pump, 0.0), 2 * to + climbs
-            cost[first:last], target[first:last] = own, to
+                costs, to = costs + blend.cost * np.where(climbs, pump, 0.0), 2 * to + climbs
+            cost[first:last], target[first:last] = costs, to
         indptr[-1] = last
         graph = csr_array((cost[:last], target[:last], indptr), shape=(states + 1, states + 1))
         distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
         return _Search(start, blend, origin, distance[0], before[0])
 
     def _direct(self, start: End, goals: Sequence[End]) -> list[Edge]:
-        """The legs from end to end; between nodes the roadmap has said what there is."""
+        """Return the direct legs from start to each goal; between two nodes only the roadmap's edges count."""
         asked = [n for n, end in enumerate(goals) if start.legs is not None or end.legs is not None]
         points = np.array([start.point, *(goals[n].point for n in asked)])
         rows = [0], [0, len(asked)], np.arange(1, len(points))
@@ -276,7 +277,7 @@ class Planner(RoutePlanner):
         return legs
 
     def _way(self, search: _Search, goal: End, direct: Edge) -> Path:
-        """The path to a goal, by nodes or directly."""
+        """Return the path to a goal, through nodes or by the direct leg."""
         start_at, goal_at = search.start.point, goal.point
         if np.array_equal(start_at, goal_at):
             return self._path(start_at, goal_at, [])
@@ -297,7 +298,10 @@ class Planner(RoutePlanner):
         return self._path(start_at, goal_at, hops[::-1])
 
     def _through(self, search: _Search, goal: End) -> tuple[float, int, Edge | None]:
-        """The least cost of a way to a goal by nodes, inf where there is none; its last state, and a last leg."""
+        """Return the least cost of a way to a goal through nodes, its last state, and its last leg if it has one.
+
+        The cost is inf if no way exists.
+        """
         phases = self._phases
         nodes = goal.nodes if goal.legs is None else goal.legs.nodes
         states = (phases * nodes[:, None] + np.arange(phases)).ravel()

@@ -1,12 +1,14 @@
-"""Refinement: nodes added where they can help, in rounds, each finer than the last, and the route found again.
+"""Refinement: adds nodes where they can help, in rounds that become finer, and searches the route again.
 
-The cost from the start to a node and from there to the goal, both by legs of one roadmap, say at the least what a
-route through it costs. A new node can only help where that sum, known from the nodes around, is hardly more than
-the best route costs (as informed RRT* and BIT* sample). Each round places nodes there, anywhere in even cells,
-finds the legs among them and the nodes that were there by one fan each, and searches again.
+The cost from the start to a node plus the cost from the node to the goal, both by legs of one roadmap, is the
+least cost of a route through the node. A new node can help only where this sum, known from the nodes around it,
+is almost as small as the cost of the best route (informed RRT* and BIT* sample in the same way). Each round
+places nodes there, one at a random place of each even cell. It finds the legs between old and new nodes by one
+fan for each node, and searches again.
 
-With the clock running, each node is left when it is reached: legs at these times give the cost to go, an
-estimate, since a route may come by a little later. The route itself is found by the search with the clock.
+With the clock running, each node is left when it is reached. The legs at these times give the remaining cost.
+This is an estimate, because a route may reach the node a little later. The search with the clock finds the route
+itself.
 """
 
 import math
@@ -44,36 +46,39 @@ from .surfacing import Surfacing
 from .time_dependent import ClockPlanner
 
 FINER, COARSEST = 0.6, 0.95
-"""Each round's spacing, in that of the round before; at most, where finer ones would have too many legs."""
+"""The spacing of a round as a share of the spacing before it; the second is the largest share, for rounds that
+would otherwise have too many legs."""
 WORTH = 0.1
-"""A round's route is polished where it costs more than the best by no more than such a share."""
+"""The route of a round is polished if it costs at most this share more than the best route."""
 WIDEST, NARROWEST = 0.03, 0.003
-"""Nodes are placed where a route through them may cost more than the best by such a share: by as much as the last
-round gained, between these."""
+"""Nodes are placed where a route through them costs at most a share more than the best route. The share is the
+gain of the last round, limited to this range."""
 MOST_PAIRS = 600_000
-"""Legs of a round, about: where there would be more, nodes are placed only where they promise most."""
+"""A round has about this many legs at most. If there would be more, nodes are placed only at the best places."""
 FEW_LEGS, OTHERS = 24, 3
-"""A route of so few legs is polished from others too, so many a round."""
+"""If a route has at most FEW_LEGS legs, OTHERS more routes of each round are polished, too."""
 LEAST_NODES = 1000
-"""A round has so many nodes, whatever their legs."""
+"""A round may have at least this many nodes, however many legs they have."""
 FEWEST_ROUNDS, MOST_ROUNDS = 2, 12
-"""The first round may gain little by chance."""
+"""The least and the greatest number of rounds; the least is 2 because the first may gain little by chance."""
 LONGEST = 1.3
-"""No leg of a round takes longer than this times the longest of the best route."""
+"""No leg of a round takes longer than this factor times the longest leg of the best route."""
 NEAR, NEAR_COUNT = 1.5, 4
-"""What is known of a new place is known from so many nodes at the most, no further away than so many spacings."""
+"""The values of a new place come from at most NEAR_COUNT nodes that are no further away than NEAR spacings."""
 APART = 10.0
-"""How far the depths that yos turn at lie apart, in spacings, where nodes stay at them: none is near another."""
+"""If nodes stay at the depths where yos turn, these depths lie this many spacings apart, so that none is near
+another."""
 DOUBT = 0.5
-"""What is known of a new place may be off by the time to cross so many spacings."""
+"""The values of a new place may be wrong by the time that a glider needs to cross this many spacings."""
 SOURCES_AT_ONCE = 256
+"""The legs of this many nodes are found together."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """When refinement ends: after a round that gains less than `within`, a share, or `seconds` after it began.
+    """When refinement ends: after a round that gains less than the share `within`, or after `seconds`.
 
-    At least one of them; no round begins that would likely end later, but the first one.
+    At least one of them must be given. A round, except the first, does not begin if it would likely end too late.
     """
 
     within: float | None = None
@@ -89,7 +94,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Refined:
-    """The best route, with its rounds; what each of these found: nodes (n, 3) [m], the edges between them."""
+    """The best route with its rounds; `parts` holds the nodes (n, 3) [m] and the edges of each round."""
 
     path: Path
     problem: Problem
@@ -97,10 +102,10 @@ class Refined:
     parts: tuple[tuple[Array, Edges], ...] = ()
 
     def whole(self) -> Roadmap:
-        """The roadmap with all nodes that were added, before the start and the goal that the scenario names.
+        """Return the roadmap with all added nodes, which stand before the scenario's start and goal.
 
-        Its legs are the roadmap's and the rounds'; InputError where there is no roadmap to add to, or where legs
-        of other times than the departure's were found.
+        Its legs are those of the roadmap and of the rounds. InputError if there is no roadmap to add to, or if
+        the legs were found at other times than the departure.
         """
         cure = "build a roadmap, and refine a query of it, in a current that is steady"
         require(self.roadmap is not None and bool(self.parts), f"there is no roadmap to write anew; {cure}")
@@ -108,14 +113,15 @@ class Refined:
         return with_added(self.problem, self.roadmap, self.parts)
 
     def write(self, file: str | File) -> None:
-        """Write that roadmap."""
+        """Write the roadmap with all added nodes to a file."""
         write_roadmap(self.whole(), file)
 
 
 class _Cloud(NamedTuple):
-    """Nodes (n, 3) [m], start and goal the last two; of each (n,) what is known.
+    """Nodes (n, 3) [m], of which the last two are start and goal, and the values of each node.
 
-    `since` the cost from the start, `left` the cost to the goal, `when` the time at which it is reached [s].
+    `since` (n,) is the cost from the start, `left` (n,) the cost to the goal, `when` (n,) the time [s] at which
+    the node is reached.
     """
 
     position: Array
@@ -124,15 +130,15 @@ class _Cloud(NamedTuple):
     when: Array
 
     def sums(self) -> Array:
-        """What a route through each node costs at the least (n,)."""
+        """Return the least cost (n,) of a route through each node."""
         return self.since + self.left
 
 
 @dataclass
 class _Cells:
-    """Even cells that new nodes are placed in: `spacing` [m] along x and y, `rise` [m] between depths.
+    """Even cells in which new nodes are placed: `spacing` [m] along x and y, `rise` [m] in depth.
 
-    `levels` [m] that nodes stay at, alone or beside those between.
+    `levels` [m] are heights at which nodes are placed; if `between`, nodes are also placed between them.
     """
 
     spacing: float
@@ -143,11 +149,11 @@ class _Cells:
 
     @classmethod
     def of(cls, problem: Problem, position: Array) -> "_Cells":
-        """As they would be of the nodes that there are (n, 3) [m]."""
+        """Make the cells that would give the nodes that exist (n, 3) [m]."""
         levels = np.unique(position[:, 2])
         between = len(levels) > 2 and not isinstance(problem.sampler, YoSampler)
         lo, hi = position.min(axis=0), position.max(axis=0)
-        # nodes at any depth stand, as it were, on some even levels
+        # nodes at any depth count as nodes on some even levels
         depths = len(levels) if len(levels) < len(position) ** (1 / 3) else len(position) ** (1 / 3)
         area = max(float(np.prod(hi[:2] - lo[:2])), 1.0)
         spacing = math.sqrt(area * depths / len(position))
@@ -157,16 +163,16 @@ class _Cells:
         return cls(spacing, max(rise, 1e-6), ends if between else levels, between, random)
 
     def finer(self, share: float) -> "_Cells":
-        """The cells of the next round, of such a share of the width."""
+        """Return the cells of the next round; `share` is their width as a share of the width now."""
         rise = share * self.rise if self.between else self.rise
         return replace(self, spacing=share * self.spacing, rise=rise)
 
     def scale(self) -> Array:
-        """What counts as near along x, y, z (3,) [m]."""
+        """Return the distances along x, y, z (3,) [m] that count as near."""
         return np.array([self.spacing, self.spacing, self.rise / (1.0 if self.between else APART)])
 
     def places(self, lo: Array, hi: Array) -> Array:
-        """A place (n, 3) [m] in each cell of a box."""
+        """Return a random place (n, 3) [m] in each cell of a box."""
         parts = []
         for z in self.levels[(self.levels >= lo[2]) & (self.levels <= hi[2])]:
             flat = jittered(lo[:2], hi[:2], np.array([self.spacing, self.spacing]), self.random)
@@ -177,7 +183,7 @@ class _Cells:
 
 
 class Refiner:
-    """Rounds of refinement for one route of a problem; `planner` has found it."""
+    """Makes the rounds of refinement for one route of a problem, which `planner` has found."""
 
     def __init__(
         self,
@@ -186,7 +192,7 @@ class Refiner:
         goal: Array,
         polish: Callable[[Path], Path] | None = None,
     ) -> None:
-        """Nothing is done yet; each round's routes go through `polish`, if there is one."""
+        """Prepare the refinement; `polish`, if given, polishes the routes of each round."""
         self.polish = polish
         self.planner, self.problem = planner, replace(planner.problem, slices=())
         self.roadmap = roadmap_under(planner)
@@ -194,11 +200,11 @@ class Refiner:
         self.clock = planner.assembly.changes and not planner.assembly.frozen
 
     def refine(self, path: Path, asked: Asked, tell: Callable[[str], None]) -> Refined:
-        """The best route when refinement ends; the path itself, polished, where nothing is gained."""
+        """Return the best route when refinement ends; it is the polished `path` if no round gains anything."""
         began = time.perf_counter()
         cloud, degree = self._first()
         cells, gain = _Cells.of(self.problem, cloud.position[:-2]), WIDEST
-        polish = (lambda one: one) if self.polish is None else self.polish
+        polish = (lambda route: route) if self.polish is None else self.polish
         best, by_nodes = polish(path), path
         rounds: list[Round] = []
         parts: list[tuple[Array, Edges]] = []
@@ -230,9 +236,9 @@ class Refiner:
         return Refined(replace(best, rounds=tuple(rounds)), self.problem, road, tuple(parts))
 
     def _starts(self, found: Path, best: Path, cloud: _Cloud, edges: Edges) -> list[Path]:
-        """The routes of a round that are worth polishing: the best, and where legs are few others, far from it.
+        """Return the routes of a round to polish: the best one, and if legs are few, also others far from it.
 
-        Polishing finds the best route near the one that it begins with, and another may end better.
+        Polishing finds the best route near its first route, so another first route may give a better result.
         """
         starts = [found] if found.cost < (1 + WORTH) * best.cost else []
         if not starts or self.polish is None or self.clock or len(found.legs) > FEW_LEGS:
@@ -253,7 +259,7 @@ class Refiner:
         return starts
 
     def _hops(self, cloud: _Cloud, edges: Edges, nodes: list[int]) -> list[Hop]:
-        """The legs between some nodes, one after the other."""
+        """Return the legs between `nodes`, one after the other."""
         first, hops = np.concatenate([[0], np.cumsum(edges.degree)]), []
         for source, target in pairwise(nodes):
             row = slice(first[source], first[source + 1])
@@ -263,7 +269,7 @@ class Refiner:
         return hops
 
     def _first(self) -> tuple[_Cloud, float]:
-        """What the nodes that are there say, and how many legs leave one."""
+        """Return the cloud of the nodes that exist, and the mean number of legs from a node."""
         problem = self.problem
         if self.clock:
             assert isinstance(self.planner, ClockPlanner)
@@ -284,7 +290,7 @@ class Refiner:
         return cloud, max(1.0, len(source) / len(position))
 
     def _with_ends(self, position: Array, source: Index, target: Index, costs: Array, times: Array) -> _Cloud:
-        """The cloud of edges among nodes, once start and goal are the last two nodes."""
+        """Return the cloud of nodes and edges, with start and goal as the last two nodes."""
         legs, count = self.problem.legs(position), len(position)
         ways: list[tuple[Index, Index, Array, Array]] = [(source, target, costs, times)]
 
@@ -310,7 +316,10 @@ class Refiner:
     def _placed(
         self, cloud: _Cloud, before: _Cells, best: Path, share: float, degree: float
     ) -> tuple[_Cloud, _Cells]:
-        """The nodes of a round, start and goal the last two, as far as they are known from the nodes around."""
+        """Return the nodes of a round, of which the last two are start and goal, and the cells in which they lie.
+
+        The values of new nodes come from the nodes around them.
+        """
         sums, scale = cloud.sums(), before.scale()
         stops = self._stops(cloud, best)
         most = (1 + share) * (float(sums[stops].max()) if stops.size else best.cost)
@@ -326,7 +335,7 @@ class Refiner:
             at = np.isfinite(far)
             promise = np.where(at, np.append(sums[np.isfinite(sums)], np.inf)[around], np.inf).min(axis=1)
             chosen = np.flatnonzero(promise <= most)
-            # a node has as many more legs as nodes are denser
+            # the number of legs of a node grows with the density of nodes
             ratio = finer ** -(3 if cells.between else 2)
             pairs = (len(chosen) + len(near)) * degree * ratio
             if pairs <= MOST_PAIRS or finer >= COARSEST:
@@ -337,15 +346,15 @@ class Refiner:
         chosen = chosen[self.problem.evaluator.allowed(new[chosen], self.problem.departure)]
         at, around = at[chosen], around[chosen]
 
-        def thereabouts(values: Array) -> Array:
-            there = np.where(at, np.append(values[np.isfinite(sums)], 0.0)[around], 0.0)
-            return np.concatenate([values, there.sum(axis=1) / at.sum(axis=1)])
+        def with_means(values: Array) -> Array:
+            near_values = np.where(at, np.append(values[np.isfinite(sums)], 0.0)[around], 0.0)
+            return np.concatenate([values, near_values.sum(axis=1) / at.sum(axis=1)])
 
         every = _Cloud(
             np.vstack([cloud.position, new[chosen]]),
-            *(thereabouts(values) for values in (cloud.since, cloud.left, cloud.when)),
+            *(with_means(values) for values in (cloud.since, cloud.left, cloud.when)),
         )
-        # so many legs as a round may have, and no more; the route's stops stay, and its ends are the last
+        # keep no more nodes than the legs of a round allow; the route's stops stay, start and goal come last
         count, stays = len(sums), np.zeros(len(every.position), np.bool_)
         stays[stops], stays[count - 2 : count] = True, False
         order = np.concatenate([sums, promise[chosen]])
@@ -356,7 +365,7 @@ class Refiner:
         return _Cloud(*(values[kept] for values in every)), cells
 
     def _box(self, position: Array, scale: Array) -> tuple[Array, Array]:
-        """The box (3,) [m] about some nodes, and a spacing more, that new ones are placed in."""
+        """Return the box, lo and hi (3,) [m], for new nodes: the box of some nodes and one spacing more."""
         lo, hi = self.problem.lo.astype(float), self.problem.hi.astype(float)
         hi[2] = min(hi[2], 0.0)
         lo[:2] = np.maximum(lo, position.min(axis=0) - scale)[:2]
@@ -364,14 +373,14 @@ class Refiner:
         return lo, hi
 
     def _stops(self, cloud: _Cloud, best: Path) -> Index:
-        """The nodes that a route stops at. Where a rule binds, they promise more than the least of all."""
+        """Return the nodes at which a route stops; with a rule of surfacing their sums may not be the least."""
         stops = np.array([best.legs[0].start, *(leg.end for leg in best.legs)])
         far, near = (np.asarray(part) for part in KDTree(cloud.position).query(stops))
         at = near[(far == 0.0) & np.isfinite(cloud.sums()[near])]
         return np.asarray(at, np.int64)
 
     def _problem_of(self, best: Path) -> Problem:
-        """The problem with exact legs, none of them much longer than those of the best route."""
+        """Return the problem with exact legs that are not much longer than the legs of the best route."""
         evaluator = self.problem.evaluator.by_fan()
         integration = evaluator.integration
         longest = LONGEST * max(leg.duration for leg in best.legs)
@@ -380,7 +389,7 @@ class Refiner:
         return replace(self.problem, evaluator=short, law=Reachable(0))
 
     def _edges(self, problem: Problem, guess: _Cloud, cells: _Cells) -> Edges:
-        """The legs of a round; none that leads away from the goal, or comes nearer by less than its own time."""
+        """Return the legs of a round, without legs that lead away from the goal or gain less than they cost."""
         evaluator, price = problem.evaluator, problem.evaluator.cost.kernel()
         position, integration = guess.position, evaluator.integration
         sink, level = fastest_sink(evaluator.polar), float(evaluator.polar.best_horizontal.max())
@@ -392,12 +401,12 @@ class Refiner:
         def wanted(source: Index) -> Bools:
             rows = list(map(np.array, tree.query_ball_point(position[source, :2], reach, workers=-1)))
             at = np.repeat(np.arange(len(source)), [len(row) for row in rows])
-            here, there = source[at], np.concatenate(rows).astype(np.int64)
-            least = price.per_second * (np.abs(position[there, 2] - position[here, 2]) / sink - unsure)
-            useful = guess.since[there] - guess.since[here] >= least
-            useful &= guess.left[here] - guess.left[there] >= least
+            here, target = source[at], np.concatenate(rows).astype(np.int64)
+            least = price.per_second * (np.abs(position[target, 2] - position[here, 2]) / sink - unsure)
+            useful = guess.since[target] - guess.since[here] >= least
+            useful &= guess.left[here] - guess.left[target] >= least
             result = np.zeros((len(source), len(position)), np.bool_)
-            result[at[useful], there[useful]] = True
+            result[at[useful], target[useful]] = True
             return result
 
         departure, batch = guess.when if self.clock else None, SOURCES_AT_ONCE * len(position)
@@ -412,7 +421,7 @@ class Refiner:
         return _Cloud(position, since, left, problem.departure + when)
 
     def _route(self, problem: Problem, cloud: _Cloud, edges: Edges, share: float) -> Path:
-        """The best route among a round's nodes, as the planner finds them."""
+        """Return the best route through the nodes of a round, found by a planner of the same kind."""
         rule = self.planner.rule
         if self.clock:
             sums = cloud.sums()
@@ -429,7 +438,7 @@ class Refiner:
 
 
 def _chain(node: int, following: Array) -> list[int]:
-    """A node and all that follow it."""
+    """Return a node and all nodes that follow it."""
     nodes = [node]
     while following[nodes[-1]] >= 0:
         nodes.append(int(following[nodes[-1]]))
@@ -439,15 +448,15 @@ def _chain(node: int, following: Array) -> list[int]:
 def _costs(
     count: int, source: Index, target: Index, costs: Array, times: Array, start: int, goal: int
 ) -> tuple[Array, Array, Array]:
-    """Of nodes: the cost from the start, the cost to the goal, the time [s] from the start (count,) each."""
+    """Return of each node (count,): cost from the start, cost to the goal, time [s] from the start."""
     graph, clock = (csr_array((values, (source, target)), shape=(count, count)) for values in (costs, times))
-    since, when = (dijkstra(one, indices=[start])[0] for one in (graph, clock))
+    since, when = (dijkstra(weights, indices=[start])[0] for weights in (graph, clock))
     left = dijkstra(graph.T.tocsr(), indices=[goal])[0]
     return since, left, when
 
 
 def roadmap_under(planner: RoutePlanner) -> Roadmap | None:
-    """The roadmap whose legs a planner takes, if there is one."""
+    """Return the roadmap whose legs a planner uses; None if it uses no roadmap."""
     if isinstance(planner, SurfacingPlanner):
         return planner.base
     return planner.roadmap if isinstance(planner, Planner) else None
@@ -461,7 +470,7 @@ def refined(
     polish: Callable[[Path], Path] | None = None,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Refined:
-    """A path that `planner` found, refined; as it is if it has no leg."""
+    """Return a path that `planner` found, refined; unchanged if the path has no leg."""
     if not path.legs:
         return Refined(path, planner.problem, roadmap_under(planner))
     start = placed_end(planner.problem, ends[0], planner.problem.start, "start")
@@ -470,7 +479,7 @@ def refined(
 
 
 def with_added(problem: Problem, roadmap: Roadmap, parts: Sequence[tuple[Array, Edges]]) -> Roadmap:
-    """A roadmap with the nodes (n, 3) [m] and the edges of some parts added; its legs stay as they are."""
+    """Return a roadmap with the nodes (n, 3) [m] and edges of `parts` added; its old legs stay unchanged."""
     named = sum(point is not None for point in (problem.start, problem.goal))
     count = len(roadmap.position) - named
     known = {tuple(place) for place in roadmap.position.tolist()}
@@ -478,18 +487,18 @@ def with_added(problem: Problem, roadmap: Roadmap, parts: Sequence[tuple[Array, 
     new = np.array([place for place in added if place not in known]).reshape(-1, 3)
     position = np.vstack([roadmap.position[:count], new, roadmap.position[count:]])
     number = {tuple(place): n for n, place in enumerate(position.tolist())}
-    own = np.arange(len(roadmap.position))
-    own[count:] += len(new)
+    numbers = np.arange(len(roadmap.position))
+    numbers[count:] += len(new)
     values = np.stack([getattr(roadmap, name) for name in EDGE_FIELDS], axis=1)
     assert roadmap.node_counts is not None
-    first = Edges(np.arange(len(own)), np.diff(roadmap.indptr), roadmap.target, values, roadmap.node_counts)
+    first = Edges(np.arange(len(numbers)), np.diff(roadmap.indptr), roadmap.target, values, roadmap.node_counts)
     keys, rows, counts = [], [], np.zeros((len(position), len(Status)), np.int32)
     places = [(np.array([number[tuple(place)] for place in where.tolist()]), edges) for where, edges in parts]
-    for mine, edges in ((own, first), *places):
+    for mine, edges in ((numbers, first), *places):
         keys.append(np.repeat(mine[edges.source], edges.degree) * len(position) + mine[edges.target])
         rows.append(edges.values)
         np.add.at(counts, mine[edges.source], edges.counts)
-    key, chosen = np.unique(np.concatenate(keys), return_index=True)  # the first of those that are alike
+    key, chosen = np.unique(np.concatenate(keys), return_index=True)  # the first of equal edges
     source, target = np.divmod(key, len(position))
     degree = np.bincount(source, minlength=len(position))
     counts[:, Status.CONNECTED] = degree

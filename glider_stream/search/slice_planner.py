@@ -1,4 +1,4 @@
-"""The planner over a roadmap of several departures: fastest routes by its slices, all else as without."""
+"""The planner for a roadmap of several departures: slices give the fastest routes, `ClockPlanner` all others."""
 
 from dataclasses import replace
 
@@ -14,11 +14,11 @@ from .time_dependent import ClockPlanner
 
 
 class SlicePlanner(ClockPlanner):
-    """Answers queries with the clock running over slices, which a fastest route between two points is found by.
+    """Answers queries with the clock running; the slices give the fastest route between two points.
 
-    What slices cannot answer (a rule of surfacing, energy, bins of time, many goals, legs that leave before the
-    first or after the last of them, no way that they know) is searched for by legs found when they are needed, as
-    by `ClockPlanner`.
+    Slices cannot answer a query with a rule of surfacing, with energy, with bins of time or with many goals. They
+    also cannot answer it if a leg leaves before the first slice or after the last one, or if they know no way.
+    Then `ClockPlanner` answers it, with legs that are found when they are needed.
     """
 
     def __init__(
@@ -27,12 +27,12 @@ class SlicePlanner(ClockPlanner):
         slices: SliceSearch,
         rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> None:
-        """Over the nodes of a roadmap of slices, whose search is made already."""
+        """Use the nodes of a roadmap of slices; `slices` searches that roadmap."""
         super().__init__(problem, slices.roadmap.position, rule)
         self.slices = slices
 
     def leaving(self, since: float) -> "SlicePlanner":
-        """The same planner for routes that leave `since` [s] later."""
+        """Return the same planner for routes that leave `since` [s] later."""
         later = SlicePlanner(self.problem.leaving(since), self.slices, self.rule)
         later._speeds = self._speeds
         return later
@@ -62,7 +62,7 @@ class SlicePlanner(ClockPlanner):
         return replace(self.assembly.path(ends.start, ends.goals[0], hops), notes=(str(agreement),))
 
     def _without(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim, why: str) -> Path:
-        """The path by legs that are found when they are needed, with a note of why slices cannot answer."""
+        """Return the path of `ClockPlanner`, with a note that says why the slices cannot answer."""
         first, last = self.slices.roadmap.departures[[0, -1]]
         slices = f"the roadmap's slices are from {first:g} s to {last:g} s"
         note = f"{slices}, and {why}: its legs were found without them"

@@ -1,8 +1,8 @@
-"""Searches over slices: leg times between departures, then each leg of the answer as it truly is.
+"""Searches over slices: interpolates leg times between departures, then finds each leg of the answer exactly.
 
-A search takes a leg's time as linear between the departures that a roadmap has. The legs of what it finds are
-then flown one after another, each found exactly at the time at which it truly leaves; what that teaches goes
-before the slices, and the search is made again, until it finds nothing better than a route that was flown.
+A search takes the time of a leg as linear between the departures of a roadmap. Then the legs of its route are
+found exactly, one after another, each at the time at which it really leaves. These exact legs replace the
+interpolated ones, and the search runs again, until it finds nothing better than a route that was flown.
 """
 
 import math
@@ -22,20 +22,22 @@ from ..roadmap.slices import SlicedRoadmap
 from .path import Hop
 
 AGREES = 0.01
-"""Search and flight agree to so much [s]."""
+"""A search and a flight agree if their arrivals differ by at most this [s]."""
 MOST_ROUNDS = 100
+"""At most this many searches are made for one route."""
 BESIDE = 0.02
-"""What a leg gains by ending a little beside its target, as a share of it, at the most."""
+"""A leg may end a little beside its target. This saves at most this share of its time."""
 LAST_LEGS_AT_ONCE = 32
-"""Nodes from which a leg to a goal that is no node is looked for together."""
+"""If the goal is not a node, the last legs from this many nodes are found together."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How far apart slices and truth were: of `legs` that were flown, the times [s] by the slices were off by
-    `most`, and by `mean` on average; `lost` legs of the slices do not exist when they should leave.
+    """The difference between the slices and exact legs.
 
-    `rounds`: how many searches it took; `agreed`: whether the last one found nothing better than what was flown.
+    Over the `legs` that were flown, the times of the slices were wrong by at most `most` [s] and by `mean` [s] on
+    average. `lost` legs of the slices do not exist at the time at which they should leave. `rounds` is the number
+    of searches. `agreed`: the last search found nothing better than the route that was flown.
     """
 
     legs: int
@@ -47,22 +49,24 @@ class Agreement:
 
     def __str__(self) -> str:
         searches = "1 search" if self.rounds == 1 else f"{self.rounds} searches"
-        said = f"slices and truth differ by {self.most:.2g} s in a leg at most, {self.mean:.2g} s on average"
+        differences = (
+            f"slices and truth differ by {self.most:.2g} s in a leg at most, {self.mean:.2g} s on average"
+        )
         lost = f", and {self.lost} legs of the slices do not exist when they should leave" if self.lost else ""
         end = "" if self.agreed else "; they did not come to agree, and a better route may exist"
-        return f"{said}, in {self.legs} legs of {searches}{lost}{end}"
+        return f"{differences}, in {self.legs} legs of {searches}{lost}{end}"
 
 
 @dataclass
 class _Learnt:
-    """Exact legs between nodes at the departures at which they were looked for."""
+    """Exact legs between nodes, by source, target and departure [s]."""
 
     rows: dict[tuple[int, int, float], Array] = field(default_factory=dict)
     off: list[float] = field(default_factory=list)
     lost: int = 0
 
     def table(self, nodes: int) -> tuple[Index, Index, Array, Array]:
-        """As `earliest_arrivals` takes it."""
+        """Return the exact legs as CSR rows, targets, departures [s] and times [s], for `earliest_arrivals`."""
         keys = sorted(self.rows)
         source = np.array([key[0] for key in keys], np.int64)
         target, when = np.array([key[1] for key in keys], np.int64), np.array([key[2] for key in keys])
@@ -72,7 +76,7 @@ class _Learnt:
 
 @dataclass(frozen=True)
 class _Found:
-    """The way that a search has found: its nodes, when it arrives [s], and a last leg to a goal beside them."""
+    """The way that a search has found: its nodes, its arrival [s], and the last leg if the goal is not a node."""
 
     nodes: list[int]
     arrives: float
@@ -83,14 +87,14 @@ class SliceSearch:
     """Finds the fastest routes over a roadmap of slices, at any departure between its first and last."""
 
     def __init__(self, roadmap: SlicedRoadmap, problem: Problem) -> None:
-        """InputError where flow, terrain or glider are not those that the roadmap was built with."""
+        """Raise InputError if the roadmap was built with another flow, terrain or glider."""
         check_unchanged(roadmap, problem)
         self.roadmap, self.problem = roadmap, problem
 
     def fastest(self, start: Array, goal: Array, departure: float) -> tuple[list[Hop] | None, Agreement]:
-        """The legs of the fastest route between two points (3,) [m], None where there is none, and how it agrees.
+        """Return the legs of the fastest route between two points (3,) [m], or None, and the agreement.
 
-        Points that are no nodes are attached by legs that are exact from the first.
+        Points that are not nodes are attached by exact legs.
         """
         first, last = self.roadmap.departures[[0, -1]]
         require(
@@ -98,17 +102,17 @@ class SliceSearch:
             f"the roadmap's departures are from {first:g} s to {last:g} s; got {departure:g} s",
         )
         learnt = _Learnt()
-        one = _Query(self, start, goal, departure, learnt)
-        best: list[Hop] | None = one.direct()
+        query = _Query(self, start, goal, departure, learnt)
+        best: list[Hop] | None = query.direct()
         arrives = math.inf if best is None else departure + best[0][2].time
         rounds, agreed = 0, False
         while rounds < MOST_ROUNDS and not agreed:
             rounds += 1
-            found = one.search(arrives - AGREES)
+            found = query.search(arrives - AGREES)
             agreed = found is None
             if found is None:
                 break
-            hops, when = one.flown(found)
+            hops, when = query.flown(found)
             if hops is not None and when < arrives:
                 best, arrives = hops, when
             agreed = arrives <= found.arrives + AGREES
@@ -117,7 +121,7 @@ class SliceSearch:
 
 
 class _Query:
-    """One question: its ends, and what is known of the legs beside the slices."""
+    """One query: its ends, and the exact legs that are known beside the slices."""
 
     def __init__(self, search: SliceSearch, start: Array, goal: Array, departure: float, learnt: _Learnt) -> None:
         self.roadmap, self.departure, self.learnt = search.roadmap, departure, learnt
@@ -132,14 +136,14 @@ class _Query:
         self._last: dict[tuple[int, float], Array] = {}
 
     def direct(self) -> list[Hop] | None:
-        """The leg from end to end, where one of them is no node: no slice has it."""
+        """Return the direct leg if start or goal is not a node, because no slice has it; else None."""
         if self.starts.size and self.goals.size:
             return None
         row = self._exact(self.start, self.goal, self.departure)
         return [(self.start, self.goal, edge_of(row))] if row[STATUS] == CONNECTED else None
 
     def search(self, latest: float) -> _Found | None:
-        """The fastest way that arrives by `latest` [s], by the slices and what was learnt; None if none does."""
+        """Return the fastest way by the slices and the exact legs; None if no way arrives by `latest` [s]."""
         road = self.roadmap
         nodes = len(road.position)
         arrival, before = np.full(nodes, math.inf), np.full(nodes, -1, np.int64)
@@ -164,7 +168,7 @@ class _Query:
         return _Found(way[::-1], arrives, last)
 
     def flown(self, found: _Found) -> tuple[list[Hop] | None, float]:
-        """The way flown: each leg as it is at its true departure. None where one does not exist then."""
+        """Return the exact legs of a way and its arrival [s]; (None, inf) if a leg does not exist at its time."""
         position, when = self.roadmap.position, self.departure
         hops: list[Hop] = []
         if self.away is not None:
@@ -190,7 +194,7 @@ class _Query:
         return hops, when
 
     def _compare(self, a: int, b: int, when: float) -> None:
-        """Note how far the slices are off for a leg that is now known exactly."""
+        """Record the error of the slices for a leg that is now known exactly."""
         row = self.learnt.rows[a, b, when]
         if row[STATUS] != CONNECTED:
             self.learnt.lost += 1
@@ -213,7 +217,10 @@ class _Query:
         return float(road.time[at]) if at < last and road.target[at] == b else math.inf
 
     def _exact(self, start: Array, goal: Array, when: float) -> Array:
-        """The leg between two points that leaves at a time [s], a row of `Edge`; none outlasts the flow."""
+        """Return the leg between two points that leaves at a time [s], a row of `Edge`.
+
+        A leg that ends after the flow's last time has the status NaN.
+        """
         evaluator = self.problem.evaluator
         row: Array = evaluator.connect(np.array([start, goal]), when, [0], [0, 1], [1])[0]
         if row[STATUS] == CONNECTED and when + row[TIME] > self.ends:
@@ -227,9 +234,9 @@ class _Query:
         return self._last[key]
 
     def _through(self, arrival: Array, latest: float) -> tuple[int, float, Array | None]:
-        """The node by which a goal that is none is reached first, by `latest`, when [s], and the leg from there.
+        """Return the node from which the goal is reached first, the arrival [s], and the last leg.
 
-        Nodes are looked at by the soonest time at which they could arrive, until none can be sooner.
+        Nodes are tried in the order of their earliest possible arrival, until no node can be earlier.
         """
         position = self.roadmap.position
         nodes = np.flatnonzero(np.isfinite(arrival) & (position[:, 2] != self.goal[2]))
@@ -248,7 +255,7 @@ class _Query:
         return best, arrives, leg
 
     def _last_legs(self, nodes: Index, when: Array) -> list[Array]:
-        """The legs from some nodes to the goal, found together where they are not known."""
+        """Return the legs from some nodes to the goal; unknown legs are found together."""
         new = [n for n, at in zip(nodes, when, strict=True) if (int(n), float(at)) not in self._last]
         if new:
             times = dict(zip(nodes.tolist(), when.tolist(), strict=True))
@@ -265,7 +272,7 @@ class _Query:
         return [self._last[int(n), float(at)] for n, at in zip(nodes, when, strict=True)]
 
     def _least(self, points: Array) -> Array:
-        """A bound below what remains [s] from each point (n, 3) [m] to the goal, however many legs it takes."""
+        """Return a lower bound (n,) of the time [s] from points (n, 3) [m] to the goal by any number of legs."""
         evaluator = self.problem.evaluator
         if not evaluator.exact:  # each leg may end beside its target by as much as the tolerance
             return np.zeros(len(points))
@@ -278,6 +285,6 @@ class _Query:
 
 
 def _arriving(attached: Attached, most: float) -> Attached:
-    """Those that are connected, by legs of no more than `most` [s]."""
+    """Return only the pairs that are connected by legs of at most `most` [s]."""
     kept = (attached.outcomes[:, STATUS] == CONNECTED) & (attached.outcomes[:, TIME] <= most)
     return Attached(attached.nodes[kept], attached.outcomes[kept])

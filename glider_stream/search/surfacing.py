@@ -1,4 +1,4 @@
-"""Rules of surfacing: a vehicle must come up, for a fix and a call, after so many yos or hours."""
+"""Rules of surfacing: a vehicle must come up for a position fix and a call after some yos or hours."""
 
 import math
 from dataclasses import dataclass
@@ -11,15 +11,20 @@ from ..base.settings import require
 from .path import SURFACE, Path
 
 BINS = 48
-"""Parts of the longest time under water that are told apart; a leg's is rounded up, so the rule always holds."""
+"""The longest time under water is divided into this many parts. The time of a leg is rounded up to whole parts,
+so the rule always holds."""
 MOST_YOS = 100
+"""The greatest number of yos between two surfacings that a rule may allow."""
 LEAST_HOURS = 0.001
-"""No vehicle comes up twice in four seconds; how often a leg exceeds far less time is too large a number."""
+"""The smallest limit of hours: no vehicle comes up twice in four seconds, and smaller limits overflow
+integers."""
 
 
 @dataclass(frozen=True)
 class Surfacing:
-    """At most so many yos (a dive and a climb), and so many hours, from one surfacing to the next.
+    """At most `most_yos` yos (a dive and a climb) and at most `most_hours` hours from one surfacing to the next.
+
+    None means that there is no limit.
 
     Examples:
         >>> rule = glider_stream.Surfacing(most_yos=1)
@@ -41,18 +46,18 @@ class Surfacing:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """How many states of either measure there are: half-yos, in which it dives and climbs by turns; time."""
+        """The number of states of half-yos (dives and climbs in turn), and the number of states of time."""
         return 1 if self.most_yos is None else 2 * self.most_yos, 1 if self.most_hours is None else BINS + 1
 
     def check_end(self, place: Array, name: str) -> None:
-        """InputError where there is a rule, and an end of a route (3,) [m] is not at the surface."""
+        """Raise InputError if there is a rule and an end of a route (3,) [m] is not at the surface."""
         up = self == Surfacing() or float(place[2]) >= -SURFACE
         require(
             up, f"a route with a rule of surfacings has its {name} at the surface; got a depth of {-place[2]:g} m"
         )
 
     def holds(self, path: Path) -> bool:
-        """Whether a path keeps the rule, each leg's time as it is."""
+        """Return whether a path keeps the rule; the times of legs are not rounded."""
         yos, hours, climbing = 0, 0.0, False
         for leg in path.legs:
             turns, climbing = leg.glide_angle > 0 and not climbing, leg.glide_angle > 0
@@ -64,11 +69,14 @@ class Surfacing:
         return True
 
     def steps(self, half: int, glide_angle: Array, time: Array) -> tuple[Index, Index]:
-        """By how much legs (n,) use up either measure, in a half-yo (odd ones climb); time in parts."""
-        none = np.zeros(len(time), np.int64)
-        turns = none if self.most_yos is None else ((glide_angle > 0) != (half % 2 == 1)).astype(np.int64)
+        """Return the half-yos (n,) and the parts of time (n,) that legs use up.
+
+        `half` is the number of the half-yo in which the legs begin; in odd half-yos the glider climbs.
+        """
+        unused = np.zeros(len(time), np.int64)
+        turns = unused if self.most_yos is None else ((glide_angle > 0) != (half % 2 == 1)).astype(np.int64)
         if self.most_hours is None:
-            return turns, none
+            return turns, unused
         parts = np.ceil(np.nan_to_num(time) / (3600 * self.most_hours / BINS) - 1e-9)
-        # a leg longer than all of it breaks the rule, however much longer it is
+        # a leg that is longer than all parts breaks the rule; how much longer does not matter
         return turns, np.minimum(parts, BINS + 1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Thinning: fewer legs, each flown again before it is believed."""
+"""Thinning: makes a route of fewer legs; each new leg is flown before it is accepted."""
 
 import math
 from collections.abc import Callable
@@ -22,13 +22,13 @@ def thin(
     fly: Callable[[list[Hop]], Path],
     stays: Callable[[Array], bool] = lambda stop: False,
 ) -> Path:
-    """A route whose stops lie within `tolerance` [m] of the old one's (Ramer 1972, Douglas and Peucker 1973).
+    """Return a route of fewer legs within `tolerance` [m] of the old one (Ramer 1972, Douglas and Peucker 1973).
 
-    A stretch becomes one leg where no stop of it lies further away from the straight line, and where one
-    glide joins its ends: `connect` says so. Else it is cut at its farthest stop. `fly` makes a path of legs,
-    those that stay flown again, too. A stop that `stays` is never left out. With the clock running every leg
-    behind one that is new begins at another time: `connect`, which takes the seconds since departure, finds it
-    anew.
+    A stretch becomes one leg if all its stops lie within the tolerance of the straight line and `connect` finds
+    one glide between its ends. Otherwise it is cut at its farthest stop. `fly` makes the path and flies all its
+    legs again, the old ones, too. A stop for which `stays` is true is always kept. With the clock running, every
+    leg after a new leg begins at another time, so `connect`, which takes the seconds since departure, finds it
+    again.
     """
     require(0 <= tolerance < np.inf, f"a route is thinned to 0 m or more; got {tolerance:g}")
     if not path.legs:
@@ -39,7 +39,7 @@ def thin(
         hops, joined, whole = _joined(path, old, tolerance, connect, stays, apart)
         if whole:
             return replace(fly(hops), unthinned=(len(old), path.travel_time))
-        # who comes sooner or later may find no way on: then the last stretch that became one leg must not
+        # a glider that arrives at another time may find no next leg: undo the last stretch that became one leg
         apart.add(joined[-1])
 
 
@@ -51,12 +51,15 @@ def _joined(
     stays: Callable[[Array], bool],
     apart: set[tuple[int, int]],
 ) -> tuple[list[Hop], list[tuple[int, int]], bool]:
-    """The legs of a thinned route, the stretches that became one leg but for those `apart`, and if all go on."""
+    """Return the legs of a thinned route, the stretches that became one leg, and whether all legs were found.
+
+    Stretches in `apart` do not become one leg.
+    """
     stops = [old[0][0], *(end for _, end, _ in old)]
     hops: list[Hop] = []
     joined: list[tuple[int, int]] = []
     clock = 0.0
-    # stretches that wait, the next one last: a route may be longer than Python's stack is deep
+    # the stretches that wait, the next one last; recursion could exceed Python's stack on long routes
     fixed = [0, *(n for n in range(1, len(old)) if stays(stops[n])), len(old)]
     waiting = list(pairwise(fixed))[::-1]
     while waiting:
@@ -72,7 +75,7 @@ def _joined(
             near = off.max() <= tolerance and (first, last) not in apart
             edge = connect(stops[first], stops[last], clock) if near else NO_LEG
             if edge.status != Status.CONNECTED:
-                # where all lie on the line the middle is as good a cut as any, and leaves less to try
+                # if all stops lie on the line, a cut in the middle leaves the fewest tries
                 cut = first + 1 + (int(off.argmax()) if off.max() > 0 else len(off) // 2)
                 waiting += [(cut, last), (first, cut)]
                 continue
@@ -83,7 +86,7 @@ def _joined(
 
 
 def _distances(points: Array, start: Array, end: Array) -> Array:
-    """Of points (n, 3) from the line between two others [m]."""
+    """Return the distances (n,) [m] of points (n, 3) from the line between two points."""
     way = end - start
     length = float(way @ way)
     share = np.clip((points - start) @ way / length, 0, 1)[:, None] if length > 0 else np.zeros((len(points), 1))

@@ -1,7 +1,7 @@
-"""The clock runs: queries in which every leg leaves when the last one arrives.
+"""Queries with the clock running: each leg leaves when the leg before it arrives.
 
-A node is expanded by its legs at the time at which it is reached, so that what is found flies from end to end in
-the flow as it changes. That needs no roadmap, only nodes.
+The legs of a node are found at the time at which the search reaches the node, so the route can be flown in the
+flow as it changes. This needs only nodes, no roadmap.
 """
 
 import math
@@ -27,22 +27,23 @@ from .trade_off import TradeOff, none_within
 from .why_not import why_not
 
 MOST_BINS, FEWER_BINS = 240, 48
-"""How many bins of time after departure a search with bins looks at; and one that was not asked to use them."""
+"""The number of bins of time after departure in a search with bins: if the query asks for bins, and if not."""
 LATER_FANS = 256
-"""Fans of a second look, for a better path: enough for all ways where nodes are few."""
+"""The second search, for a better path, uses this many fans; with few nodes they are enough for all ways."""
 TRIED_FANS = 32
-"""So many where the first look took more than `LATER_FANS`: then all ways can hardly be followed."""
+"""The second search uses only this many fans if the first used more than `LATER_FANS`, because then it can hardly
+follow all ways."""
 NARROWEST = 8.0
-"""Bins are not halved below so many seconds: two ways that arrive so soon after each other go on alike."""
+"""Bins are not made narrower than this [s]: two ways that arrive within such a short time continue alike."""
 BETTER = 1e-3
-"""A later way must be better by so much [s or J]: what is found twice, in other batches, is no gain."""
+"""A later way must be better by this [s or J], so that a way that is found twice in other batches is no gain."""
 
 
 class ClockPlanner(RoutePlanner):
-    """Answers queries among nodes (n, 3) [m] by legs found when they are needed; any number, at any departure.
+    """Answers any number of queries among nodes (n, 3) [m], at any departure, by legs found when they are needed.
 
-    As `query.Planner`, which it stands in for wherever the flow changes. A `rule` of surfacing holds with the
-    clock running. With `frozen` every leg meets the current of the problem's departure.
+    It has the methods of `query.Planner` and replaces it in a flow that changes with time. All paths keep the
+    `rule` of surfacing. With `frozen` every leg meets the current of the problem's departure.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class ClockPlanner(RoutePlanner):
         rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
         frozen: bool = False,
     ) -> None:
-        """Nothing is looked for yet."""
+        """Keep the nodes; no leg is searched yet."""
         super().__init__(problem, rule, frozen)
         self.position = position
         self._speeds: dict[float, GreatestSpeeds] = {}
@@ -62,17 +63,17 @@ class ClockPlanner(RoutePlanner):
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
     ) -> Path:
-        """The cheapest path between two points (3,) [m]; the scenario's own start and goal where None."""
+        """Return the cheapest path between two points (3,) [m]; None stands for the scenario's start or goal."""
         return self._query(start, goal, Aim(by_cost=True))
 
     def leaving(self, since: float) -> "ClockPlanner":
-        """The same planner for routes that leave `since` [s] later."""
+        """Return the same planner for routes that leave `since` [s] later."""
         later = ClockPlanner(self.problem.leaving(since), self.position, self.rule, self.assembly.frozen)
         later._speeds = self._speeds
         return later
 
     def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
-        """The fastest path that costs no more than so much; where there is none, why."""
+        """Return the fastest path that costs at most `most_cost`; if no path does, it says why."""
         aim = Aim(cost_below=float(np.nextafter(most_cost, math.inf)))
         path = self._query(start, goal, aim)
         return path if path.found else none_within(self.query(start, goal), most_cost)
@@ -87,11 +88,11 @@ class ClockPlanner(RoutePlanner):
         return self._looked_again(ends, aim, path, search)
 
     def _looked_again(self, ends: Ends, aim: Aim, path: Path, search: LabelSearch) -> Path:
-        """The best of a path and of ways that come to some node later than at the soonest; what was looked at.
+        """Return the best of a path and of ways that reach some node later than the earliest way, with a note.
 
-        Bins begin as long as the legs and are halved, until `LATER_FANS` are spent. Where no path is known, all
-        ways in the first bins are followed: a glider that cannot hold its place comes back later, and only then
-        finds a way on.
+        The first bins are as long as a typical leg. They are halved until `LATER_FANS` fans are spent. If no path
+        is known, all ways in the first bins are followed, because a glider that the current carries away may come
+        back later and only then find a way on.
         """
         durations = [float(label.row[TIME]) for label in search.labels if label.row is not None]
         if not durations or not self.assembly.changes or self.assembly.frozen:
@@ -104,7 +105,7 @@ class ClockPlanner(RoutePlanner):
         while whole and width >= NARROWEST:
             below = (best.cost if search.by_cost else departure + best.travel_time) - BETTER
             later = replace(aim, bins=width, latest=latest, below=below)
-            # why there is no path tell the widest bins, whose ways are the most that were all followed
+            # the reason for no path comes from the widest bins: only there were all ways surely followed
             found, again = self._first(ends, later, expansion, known=best.found or width < widest)
             best = found if found.found or (width == widest and not best.found) else best
             whole, expansion.most = again.whole, max(fans, expansion.found)
@@ -117,7 +118,7 @@ class ClockPlanner(RoutePlanner):
         return best if whole else replace(best, notes=(*best.notes, self._in_part(again, finest)))
 
     def _in_part(self, search: LabelSearch, finest: float) -> str:
-        """What is not known of a path, where ways that come to a node later were not all followed."""
+        """Return the note on a path for which not all ways that reach a node later were followed."""
         start = search.expansion.start
         least = float((search.cost_left if search.by_cost else search.left)[start])
         bound = f"{least:,.0f} J" if search.by_cost else f"{least:,.0f} s"
@@ -128,7 +129,7 @@ class ClockPlanner(RoutePlanner):
         )
 
     def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
-        """The cheapest paths from a point (3,) [m] to each of many, by one search."""
+        """Return the cheapest paths from one point (3,) [m] to each of many, by one search."""
         if len(goals) == 1:
             return [self.query(start, goals[0])]
         ends = self._ends(start, goals)
@@ -146,13 +147,13 @@ class ClockPlanner(RoutePlanner):
         return [self._path(search, expansion, first.get(n), ends, n) for n in range(len(goals))]
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
-        """Costs of the cheapest paths from n points (3,) [m] to m others: (n, m), inf where there is none."""
+        """Return the costs (n, m) of the cheapest paths from n points (3,) [m] to m others; else inf."""
         return np.array([[path.cost for path in self.queries(start, goals)] for start in starts]).reshape(
             len(starts), len(goals)
         )
 
     def arrivals(self, start: ArrayLike | None = None) -> Array:
-        """When each node (n,) can be reached from a point at the soonest [s since departure]; inf where not."""
+        """Return the earliest time (n,) [s after departure] at which each node is reached; inf if it is not."""
         departure, times = self.problem.departure, np.full(len(self.position), math.inf)
         search, _ = self._search(self._ends(start, []), Aim(), to_all=True)
         for number in search.settled():
@@ -162,7 +163,7 @@ class ClockPlanner(RoutePlanner):
         return times
 
     def front(self, start: ArrayLike | None = None, goal: ArrayLike | None = None) -> TradeOff:
-        """Every path that no other beats both in time and in energy, by rising time."""
+        """Return every path for which no other is better both in time and in energy, sorted by time."""
         ends = self._ends(start, [goal])
         search, expansion = self._search(ends, self._with_bins(Aim(front=True)))
         found: list[int | None] = [n for n in search.settled() if search.is_goal[search.labels[n].place]]
@@ -171,7 +172,7 @@ class ClockPlanner(RoutePlanner):
         return TradeOff(tuple(paths), whole=exact)
 
     def _ends(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> Ends:
-        """Where the ends of a query are, checked."""
+        """Return the ends of a query after checks."""
         departure, extent = self.problem.departure, self.problem.evaluator.flow.extent
         times = f"the times of the flow, {extent.t_lo:g} to {extent.t_hi:g} s"
         within = extent.t_lo <= departure <= extent.t_hi
@@ -201,7 +202,7 @@ class ClockPlanner(RoutePlanner):
         return LabelSearch(expansion, cost, self.rule, least, goals, departure, aim)
 
     def _speeds_now(self) -> GreatestSpeeds:
-        """The greatest speeds from the departure on; those from an earlier time on bound them, too."""
+        """Return the greatest speeds from the departure, or from an earlier time, on; both are upper bounds."""
         departure = self.problem.departure
         since = max((begin for begin in self._speeds if begin <= departure), default=departure)
         if since not in self._speeds:
@@ -211,7 +212,10 @@ class ClockPlanner(RoutePlanner):
     def _first(
         self, ends: Ends, aim: Aim, bounded: BoundedExpansion | None = None, known: bool = False
     ) -> tuple[Path, LabelSearch]:
-        """The path of the first label that settles at the goal; not why there is none where one is `known`."""
+        """Return the path of the first final label at the goal, and the search.
+
+        If no path is found and one is `known` already, the reason is not looked for.
+        """
         clock = self._expansion(ends) if bounded is None else bounded.clock
         search = self._search_of(bounded or clock, clock.goals[0], aim)
         number = next((n for n in search.settled() if search.is_goal[search.labels[n].place]), None)

@@ -1,4 +1,4 @@
-"""The trade of time against energy for one query: every path that no other beats in both."""
+"""The trade of time against energy for one query: every path for which no other path is better in both."""
 
 import math
 from dataclasses import dataclass, replace
@@ -26,22 +26,22 @@ IN_PART = (
 
 @dataclass(frozen=True)
 class TradeOff:
-    """`paths` by rising time and falling energy: all that there are of which no other is better in both.
+    """All `paths` for which no other path is better both in time and in energy; time rises and energy falls.
 
-    One path that is not found where there is none. Not `whole`: in a flow that changes, ways that come to a node
-    later, and for no less energy, were not followed; one of them may go on better.
+    If no path exists, `paths` holds one path that is not found. If `whole` is False, the flow changes with time
+    and ways that reach a node later with no less energy were not followed; such a way may continue better.
     """
 
     paths: tuple[Path, ...]
     whole: bool = True
 
     def within(self, energy: float) -> Path:
-        """The fastest of them that uses at most so much energy [J]; where there is none, why."""
+        """Return the fastest path that uses at most `energy` [J]; if no path does, it says why."""
         found = next((path for path in self.paths if path.cost <= energy), None)
         return found or none_within(self.paths[-1], energy)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: each path's time, energy and number of legs."""
+        """Return a table for JSON: time, energy and number of legs of each path."""
         rows = [(path.travel_time, path.cost, len(path.legs)) for path in self.paths]
         still = {} if self.paths[0].departure is None else {"frozen": self.paths[0].frozen}
         return {
@@ -61,7 +61,7 @@ class TradeOff:
 
 
 def none_within(least: Path, energy: float) -> Path:
-    """The honest no to a bound on energy [J], below that of the path that uses the least."""
+    """Return the answer that no path uses at most `energy` [J]; `least` is the path that uses the least."""
     if not least.found:
         return least
     why = f"the least that one takes is {least.cost:,.0f} J, more than {energy:,.0f}"
@@ -69,10 +69,10 @@ def none_within(least: Path, energy: float) -> Path:
 
 
 class RoadmapExpansion:
-    """The legs of a roadmap whose edges hold at any time, and of its ends, as `expansion.Expansion` has them."""
+    """An `Expansion` of a roadmap's legs, which are the same at any time, and of the legs of start and goal."""
 
     def __init__(self, road: Roadmap, ends: "RoadmapEnds") -> None:
-        """Number the places: the nodes, the goal and the start where they are none."""
+        """Number the places: the nodes, then the goal and the start if they are not nodes."""
         self.road, self.ends = road, ends
         beside = [] if ends.goal_legs is None else [ends.goal]
         apart = [] if ends.start_legs is None else [ends.start]
@@ -83,32 +83,32 @@ class RoadmapExpansion:
 
     @property
     def places(self) -> Array:
-        """As Expansion says."""
+        """The positions of all places (n, 3) [m]."""
         return self._places
 
     @property
     def nodes(self) -> int:
-        """As Expansion says."""
+        """The number of nodes; the nodes are the first places."""
         return len(self.road.position)
 
     @property
     def start(self) -> int:
-        """As Expansion says."""
+        """The number of the start among the places."""
         return int(self.ends.start_nodes[0]) if self.ends.start_legs is None else len(self._places) - 1
 
     @property
     def goals(self) -> Index:
-        """The places of the goal."""
+        """The numbers of the places at the goal."""
         return self.ends.goal_nodes if self.ends.goal_legs is None else np.array([self.nodes])
 
     @property
     def spent(self) -> bool:
-        """As Expansion says: never."""
+        """Always False: this expansion has no limit."""
         return False
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
-        """As Expansion says: all of them, at any time."""
-        return [self._fan(int(one)) for one in place]
+        """Return all legs from places `place` (n,); they do not depend on `time`, and `wanted` is ignored."""
+        return [self._fan(int(number)) for number in place]
 
     def _fan(self, place: int) -> Fan:
         fan = NO_LEGS
@@ -131,9 +131,9 @@ class RoadmapExpansion:
 
 @dataclass(frozen=True)
 class RoadmapEnds:
-    """Start and goal (3,) [m] of a query of a roadmap: the nodes there, or the legs of an end that is no node.
+    """Start and goal (3,) [m] of a query of a roadmap, with the nodes at each, or its legs if it is not a node.
 
-    `direct`: the leg from end to end, where one of them is no node.
+    `direct` is the leg from start to goal; it is not connected if both are nodes.
     """
 
     start: Array
@@ -146,18 +146,21 @@ class RoadmapEnds:
 
 
 class LeftInRoadmap:
-    """What a way to the goal takes at the least by a roadmap's legs: exact but for a turn at its beginning."""
+    """Lower bounds of time and cost to the goal by a roadmap's legs; they are exact except for the first turn."""
 
     def __init__(self, expansion: RoadmapExpansion, sink: float) -> None:
-        """`sink` [m/s]: no glide changes its depth faster."""
+        """Keep the expansion; `sink` [m/s] is the greatest vertical speed of any glide."""
         self.expansion, self.sink = expansion, sink
 
     def between(self, place: int) -> Array:
-        """As labels.Bound says; a roadmap's legs are at hand, so there is nothing to leave out."""
+        """Return the bound 0 (n,) [s] for all places: a roadmap's legs are known, so none need be left out."""
         return np.zeros(len(self.expansion.places))
 
     def remaining(self, goals: Index, cost: Cost) -> tuple[Array, Array]:
-        """As labels.Bound says, by Dijkstra's algorithm from the goals, backward over time, then over cost."""
+        """Return lower bounds from each place to the nearest goal: of time (n,) [s], and of cost (n,).
+
+        Dijkstra's algorithm runs backward from the goals, once over time and once over cost.
+        """
         fans = [self.expansion._fan(place) for place in range(len(self.expansion.places))]
         source = np.repeat(np.arange(len(fans)), [fan.target.size for fan in fans])
         target = np.concatenate([fan.target for fan in fans])
@@ -167,7 +170,7 @@ class LeftInRoadmap:
         turn = cost.inflection(self.expansion.places[:, 2])
         if turn is None:
             return time, _backward(target, source, rows[:, COST], goals, len(fans))
-        # twice each place: come to by a dive (even), from where a climb costs a turn, and by a climb (odd)
+        # each place has two states: even if reached by a dive, so that a climb costs a turn; odd if by a climb
         ends = np.concatenate([2 * target + climbs, 2 * target + climbs])
         begins = np.concatenate([2 * source, 2 * source + 1])
         costs = np.concatenate([rows[:, COST] + np.where(climbs, turn[source], 0.0), rows[:, COST]])
@@ -176,7 +179,9 @@ class LeftInRoadmap:
 
 
 def _backward(begin: Index, end: Index, weight: Array, goals: Index, count: int) -> Array:
-    """The least sums from each of `count` places to one of the goals, over legs turned round."""
+    """Return the least sums (count,) from each place to one of the goals, over reversed legs."""
     graph = csr_array((weight, (begin, end)), shape=(count, count))
     found: Array = dijkstra(graph, directed=True, indices=goals, min_only=True)
-    return found * (1 - 1e-12)  # sums in another order must not come out above
+    return found * (
+        1 - 1e-12
+    )  # sums in another order have rounding errors and must not be smaller than the bound

@@ -1,7 +1,7 @@
-"""Why not? What keeps a search from its goal, and how near to it one could come.
+"""Why not? Explains why a search does not reach its goal, and how near to it a glider can come.
 
-The search says when each node is reached, if it is. From the nodes reached that lie nearest to the goal the legs
-that would lead on are looked at again, and each says what became of it.
+The search gives the time at which each node is reached, if it is reached. From the reached nodes that are nearest
+to the goal the onward legs are evaluated again, and the status of each leg is counted.
 """
 
 import math
@@ -19,11 +19,11 @@ from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
 
 FRONTIER = 32
-"""How many of the nodes reached, those nearest to the goal, are looked at."""
+"""The legs of this many reached nodes, the nearest to the goal, are evaluated again."""
 ONWARD = 27
-"""How many legs of each: to the nearest nodes at other depths."""
+"""From each of these nodes this many legs are evaluated: those to the nearest nodes at other depths."""
 ALONG = 9
-"""Places on a leg where the current is read."""
+"""The current is read at this many places on a leg."""
 WORDS = {
     Status.CURRENT_TOO_STRONG: "the current is too strong for any control",
     Status.TOO_FAR: "too far or too deep for one glide within the horizon",
@@ -55,48 +55,49 @@ CAUSES = {
 
 @dataclass(frozen=True)
 class Looked:
-    """Legs that were looked at again: how many of each status, how many the current makes impossible."""
+    """Legs that were evaluated again: how many have each status, and for how many the current is too strong."""
 
     counts: dict[Status, int] = field(default_factory=dict)
     outrun: int = 0
 
     @property
     def total(self) -> int:
-        """How many."""
+        """The number of legs."""
         return sum(self.counts.values())
 
     @property
     def share(self) -> float:
-        """The share that the current makes impossible."""
+        """The share of legs that the current makes impossible."""
         return self.outrun / max(self.total, 1)
 
     @property
     def cause(self) -> str:
-        """What most of them fail for; the current where it forbids half of them, whatever a method says."""
+        """The cause of most failures; it is the current if the current forbids half of the legs."""
         if not self.total or 2 * self.outrun >= self.total:
             return "current" if self.total else "depth"
         return CAUSES[max(self.counts, key=lambda status: (self.counts[status], -status))]
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a table for JSON."""
         statuses = {status.name.lower(): count for status, count in self.counts.items()}
         return {"looked_at": self.total, "statuses": statuses, "current_outruns_share": self.share}
 
     def __str__(self) -> str:
         ranked = sorted(self.counts.items(), key=lambda item: -item[1])
         parts = [f"{count / self.total:.0%} {WORDS[status]}" for status, count in ranked]
-        said = ", ".join(parts)
-        return f"{said}; the current outruns the glider on {self.share:.0%} of them" if self.outrun else said
+        shares = ", ".join(parts)
+        return f"{shares}; the current outruns the glider on {self.share:.0%} of them" if self.outrun else shares
 
 
 @dataclass(frozen=True)
 class WhyNot:
-    """Why no path leads from start to goal, of `nodes` in the roadmap, `reached` of them.
+    """Why no path leads from start to goal; `reached` of the `nodes` are reached.
 
-    `nearest` (3,) [m]: the place reached that lies nearest to the goal, `distance` [m] from it, `after` [s];
-    `place` (2,) [degrees] of it, where known. `onward`: legs that would lead on from there; `into`: those that
-    would end at the goal. `spacing` and `reach`: across and down [m], of nodes and of one glide. `outside`: what
-    of start and goal lies outside the box of nodes, and how far [m].
+    `left`: some leg leaves the start; `entered`: some leg ends at the goal. `nearest` (3,) [m] is the reached
+    place that is nearest to the goal, at `distance` [m] from it, reached `after` [s]; `place` (2,) [degrees] is
+    the same place, if known. `onward` are legs that would lead on from there, `into` legs that would end at the
+    goal. `spacing` of nodes and `reach` of one glide are given across and down [m]. `outside` says how far [m]
+    start or goal lie outside the box of nodes.
     """
 
     nodes: int
@@ -122,7 +123,7 @@ class WhyNot:
         return self.onward.cause
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a table for JSON."""
         when = None if self.departs is None else (self.departs + timedelta(seconds=self.after)).isoformat()
         return {
             "cause": self.cause,
@@ -146,16 +147,16 @@ class WhyNot:
 
     def __str__(self) -> str:
         if not self.left:
-            said = f"the start is not left: of {self.onward.total} legs looked at, {self.onward}"
+            reason = f"the start is not left: of {self.onward.total} legs looked at, {self.onward}"
         elif not self.entered:
-            said = f"no leg ends at the goal: of {self.into.total} looked at, {self.into}"
+            reason = f"no leg ends at the goal: of {self.into.total} looked at, {self.into}"
         else:
-            said = f"of {self.onward.total} legs that would lead on, {self.onward}"
+            reason = f"of {self.onward.total} legs that would lead on, {self.onward}"
         if self.onward.total == 0 and not (self.left and not self.entered):
-            said = "there are no nodes at other depths that would lead on"
+            reason = "there are no nodes at other depths that would lead on"
         if self.cause == "spacing":
-            said += f"; {_apart(self.spacing, self.reach)}"
-        said += "".join(
+            reason += f"; {_apart(self.spacing, self.reach)}"
+        reason += "".join(
             f"; the {name} lies {_far(far)} outside the box of nodes" for name, far in self.outside.items()
         )
         x, y = self.nearest[:2] if self.place is None else self.place
@@ -166,7 +167,7 @@ class WhyNot:
         near = "the start itself" if self.after == 0 else f"{where}, {when}"
         reached = f"{self.reached:,} of {self.nodes:,} nodes are reached"
         nearest = f"the nearest to the goal, {_far(self.distance)} from it, is {near}"
-        return f"{said}; {reached}, {nearest}; {ADVICE[self.cause]}"
+        return f"{reason}; {reached}, {nearest}; {ADVICE[self.cause]}"
 
 
 def _far(metres: float) -> str:
@@ -183,14 +184,15 @@ def _apart(spacing: tuple[float, float], reach: tuple[float, float]) -> str:
 def why_not(
     problem: Problem, position: Array, arrival: Array, start: Array, goal: Array, clock: bool = False
 ) -> WhyNot:
-    """Why a search that reaches nodes (n, 3) [m] at `arrival` (n,) [s], inf where never, does not reach its goal.
+    """Return why a search does not reach its goal.
 
+    `position` (n, 3) [m] are the nodes and `arrival` (n,) [s] the times at which they are reached, inf if never.
     Start and goal (3,) [m]. Legs leave at the problem's departure, or with `clock` when their node is reached.
     """
     reached = np.isfinite(arrival)
     away = reached & ~(position == start).all(axis=1)
     left = bool(away.any())
-    # the start counts among the places reached: it may lie nearer to the goal than all others
+    # the start counts as a reached place: it may be the nearest to the goal
     places = np.vstack([position[reached], start])
     times = np.append(arrival[reached], 0.0)
     distances = np.linalg.norm(places - goal, axis=1)
@@ -223,7 +225,7 @@ def why_not(
 
 
 def reach_of(problem: Problem) -> tuple[float, float]:
-    """What one glide covers at most within the horizon, across with the fastest current, and of depth [m]."""
+    """Return the greatest way of one glide within the horizon: across with the fastest current, and down [m]."""
     evaluator = problem.evaluator
     polar, horizon = evaluator.polar, evaluator.integration.dt * evaluator.integration.steps
     across = (float(polar.best_horizontal.max()) + float(evaluator.flow.extent.max_speed)) * horizon
@@ -232,7 +234,7 @@ def reach_of(problem: Problem) -> tuple[float, float]:
 
 
 def _outside(problem: Problem, start: Array, goal: Array) -> dict[str, float]:
-    """How far start and goal lie outside the box of nodes [m], those that do."""
+    """Return by name how far [m] start and goal lie outside the box of nodes; a point within is left out."""
     far = {}
     for name, point in (("start", start), ("goal", goal)):
         off = float(np.linalg.norm(point - np.clip(point, problem.lo, problem.hi)))
@@ -244,9 +246,9 @@ def _outside(problem: Problem, start: Array, goal: Array) -> dict[str, float]:
 def _onward(
     problem: Problem, sources: Array, departs: Array, targets: Array, goal: Array, nearer: bool
 ) -> tuple[Looked, tuple[float, float]]:
-    """The legs from places to the nearest of others at other depths, and how far apart the nearest ones are.
+    """Evaluate legs from places to the nearest targets at other depths; return also the spacing of targets [m].
 
-    With `nearer`, only those that lead towards the goal.
+    With `nearer` only targets that are nearer to the goal are used.
     """
     left = np.linalg.norm(targets - goal, axis=1)
     chosen: list[Index] = []
@@ -271,7 +273,7 @@ def _onward(
 
 
 def _into(problem: Problem, position: Array, departs: Array, goal: Array) -> Looked:
-    """The legs to the goal from places at other depths: the nearest, and some of all others within reach."""
+    """Evaluate legs to the goal from places at other depths: the nearest, and some others within reach."""
     near = np.flatnonzero(position[:, 2] != goal[2])
     far = np.linalg.norm(position[near] - goal, axis=1)
     near = near[np.argsort(far, kind="stable")]
@@ -282,7 +284,7 @@ def _into(problem: Problem, position: Array, departs: Array, goal: Array) -> Loo
 
 
 def _look(problem: Problem, sources: Array, departs: Array, pairs: Index, ends: Array) -> Looked:
-    """What becomes of legs from sources[pairs] (m,) to `ends` (m, 3) [m]; `pairs` rises."""
+    """Evaluate the legs from sources[pairs] (m,) to `ends` (m, 3) [m]; `pairs` must rise."""
     if not pairs.size:
         return Looked()
     first = len(sources)
@@ -300,10 +302,10 @@ def _look(problem: Problem, sources: Array, departs: Array, pairs: Index, ends: 
 
 
 def outrun(problem: Problem, starts: Array, ends: Array, departs: Array) -> Bools:
-    """Whether the mean current on the straight line of legs (n, 3) [m] leaves the glider no way along it.
+    """Return a mask (n,) of the legs (n, 3) [m] whose mean current is too strong for flight along the line.
 
-    It must make good the current across, and still get ahead: u_along + sqrt(V^2 - u_across^2) > 0, V the
-    fastest horizontal speed through water.
+    The glider must balance the current across the line and still move ahead: u_along + sqrt(V^2 - u_across^2) >
+    0, where V is the fastest horizontal speed through water.
     """
     evaluator = problem.evaluator
     share = np.linspace(0.0, 1.0, ALONG)[:, None, None]
@@ -321,9 +323,9 @@ def outrun(problem: Problem, starts: Array, ends: Array, departs: Array) -> Bool
 
 
 def no_edges(road: Roadmap, problem: Problem) -> str:
-    """Why a roadmap holds no edge, in a sentence; empty where it holds some.
+    """Return a sentence that says why a roadmap has no edge; empty if it has edges.
 
-    Legs of some of its nodes are looked at again: a law of neighbours may have proposed none.
+    Legs of some of its nodes are evaluated again, because a law of neighbours may have proposed no pair.
     """
     if road.target.size:
         return ""
@@ -332,7 +334,7 @@ def no_edges(road: Roadmap, problem: Problem) -> str:
     looked, spacing = _onward(problem, some, departs, road.position, some[0], False)
     if not looked.total:
         return f"the roadmap has no edge: its nodes lie at one depth, and one glide changes it; {ADVICE['depth']}"
-    said = f"the roadmap has no edge: of {looked.total:,} legs to the nearest nodes at other depths, {looked}"
+    reason = f"the roadmap has no edge: of {looked.total:,} legs to the nearest nodes at other depths, {looked}"
     if looked.cause == "spacing":
-        said += f"; {_apart(spacing, reach_of(problem))}"
-    return f"{said}; {ADVICE[looked.cause]}"
+        reason += f"; {_apart(spacing, reach_of(problem))}"
+    return f"{reason}; {ADVICE[looked.cause]}"
