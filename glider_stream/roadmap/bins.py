@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from ..kernels.patch import MAX_LEVELS, NodeBins
 
 NODES_PER_BIN = 2.0
+"""A bin holds about this many nodes on average."""
 
 
 def node_bins(position: NDArray[np.float64]) -> NodeBins:
-    """Bins for nodes (n, 3) [m]: on their own depths where these are few, else in even layers."""
+    """Return bins for nodes (n, 3) [m]: one layer for each depth if the depths are few, else even layers."""
     z = position[:, 2]
     depths = np.unique(z)
     aligned = depths.size <= MAX_LEVELS

@@ -1,4 +1,4 @@
-"""How a roadmap is built: nodes, then the pairs of some nodes at a time."""
+"""Builds a roadmap: first the nodes, then the pairs of some nodes at a time."""
 
 import math
 import time
@@ -24,13 +24,14 @@ from .slices import SlicedRoadmap, rows_of
 from .step_error import StepSample
 
 BATCH_PAIRS = 100_000
+"""About this many pairs are evaluated together."""
 SPANS = 2
-"""Shares of a batch for each thread, so that none waits long for the slowest."""
+"""A batch has at least this many shares for each thread, so that no thread waits long for the slowest."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a build is: pairs done and in all, connected so far, seconds since it began."""
+    """The progress of a build: pairs that are done, all pairs, connected pairs, seconds since the begin."""
 
     done: int
     total: int
@@ -46,7 +47,7 @@ class Progress:
 
 
 def node_positions(problem: Problem) -> Array:
-    """The scenario's nodes (n, 3) [m]; its start and goal are the last two, where it names them."""
+    """Return the scenario's nodes (n, 3) [m]; the last two are its start and goal, if it has them."""
     sampled = problem.sampler.nodes(
         problem.lo, problem.hi, lambda points: problem.evaluator.allowed(points, problem.departure)
     )
@@ -77,12 +78,12 @@ def find_edges(
     departure: Array | None = None,
     wanted: Callable[[Index], Bools] | None = None,
 ) -> Iterator[Edges]:
-    """Evaluate all pairs of the nodes `source`, all if None, among nodes (n, 3) [m], some `batch_pairs` at once.
+    """Evaluate the pairs from nodes `source` to the nodes (n, 3) [m], and yield the edges of each batch.
 
-    Each node is left at its `departure` (n,) [s], at the problem's if None; `wanted` says of some sources to
-    which nodes (sources, n) legs are of use, others may be left out. Neither the number of threads nor the
-    batches change a bit of the result. The edges leave rows, as `slices.rows_of` numbers them: with one
-    departure the nodes.
+    If `source` is None, all nodes are sources. A batch has about `batch_pairs` pairs. Legs begin at the node's
+    `departure` (n,) [s], or at the problem's if it is None. `wanted` returns for some sources a mask (sources, n)
+    of the targets of use; other pairs may be left out. Threads and batches do not change a bit of the result. The
+    sources of the edges are rows as `slices.rows_of` numbers them; with one departure they are nodes.
     """
     require(batch_pairs >= 1, f"`batch_pairs` must be at least 1; got {batch_pairs}")
     legs = problem.legs(position)
@@ -99,7 +100,7 @@ def find_edges(
 
 
 def nodes_of_batch(problem: Problem, legs: Legs, batch_pairs: int) -> int:
-    """How many nodes have some `batch_pairs`; of many departures no fewer than keep all threads busy."""
+    """Return the number of nodes with about `batch_pairs` pairs; with many departures enough for all threads."""
     nodes, slices = max(1, batch_pairs // legs.pairs_per_node), len(problem.departures)
     return max(nodes // slices, min(nodes, SPANS * NODES_AT_ONCE * threads_now()))
 
@@ -111,7 +112,7 @@ def _evaluated(legs: Legs, source: Index, departure: Array | None, wanted: Bools
 
 
 def _followed(follower: Follower, source: Index) -> Edges:
-    """The edges of some nodes at all departures."""
+    """Return the edges of some nodes at all departures."""
     began = time.perf_counter()
     rows = rows_of(source, len(follower.problem.departures)).reshape(len(source), -1)
     edges = in_order([_edges(rows[:, k], found, 0.0) for k, found in enumerate(follower.slices(source))])
@@ -119,7 +120,7 @@ def _followed(follower: Follower, source: Index) -> Edges:
 
 
 def _edges(source: Index, batch: Found, seconds: float) -> Edges:
-    """Pairs that were looked at as edges and counts."""
+    """Return evaluated pairs as edges and counts."""
     status = batch.outcomes[:, STATUS].astype(np.int64)
     connected = status == Status.CONNECTED
     node = np.repeat(np.arange(len(source)), np.diff(batch.indptr))
@@ -132,7 +133,7 @@ def _edges(source: Index, batch: Found, seconds: float) -> Edges:
 
 @dataclass
 class Tally:
-    """What a build of `nodes` has looked at so far: pairs by status, seconds, compilation left out, threads."""
+    """What a build of `nodes` has evaluated so far: pairs by status, seconds without compilation, threads."""
 
     nodes: int
     threads: int
@@ -141,7 +142,7 @@ class Tally:
     done: int = 0
 
     def add(self, edges: Edges) -> Progress:
-        """Count some more nodes' pairs; how far that is."""
+        """Count the pairs of more nodes, and return the progress."""
         self.counts += edges.counts.sum(axis=0)
         self.seconds += edges.seconds
         self.done += edges.source.size
@@ -150,7 +151,7 @@ class Tally:
         return Progress(looked, total, int(self.counts[Status.CONNECTED]), self.seconds)
 
     def by_name(self) -> dict[str, int]:
-        """Pairs by the name of their status, in lower case."""
+        """Return the number of pairs by the name of their status, in lower case."""
         return {status.name.lower(): int(self.counts[status]) for status in Status}
 
 
@@ -160,7 +161,7 @@ def build_roadmap(
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
 ) -> Roadmap:
-    """A problem's roadmap, in memory; see `jobs.build_file` for one on disk.
+    """Return a problem's roadmap, made in memory; `jobs.build_file` makes one on disk.
 
     Examples:
         >>> problem = glider_stream.read_scenario("small.toml").problem()
@@ -177,7 +178,7 @@ def build_slices(
     progress: Callable[[Progress], None] = lambda progress: None,
     batch_pairs: int = BATCH_PAIRS,
 ) -> SlicedRoadmap:
-    """A problem's roadmap, in memory, of all its departures."""
+    """Return a problem's roadmap of all its departures, made in memory."""
     position = node_positions(problem)
     parts: list[Edges] = []
     with threads(thread_count) as used:
@@ -186,7 +187,7 @@ def build_slices(
             provenance_of(problem, position),
             problem,
             position,
-            lambda one, nodes: find_edges(one, position, nodes, batch_pairs),
+            lambda at_departure, nodes: find_edges(at_departure, position, nodes, batch_pairs),
         )
         tally = Tally(len(position) * len(problem.departures), used)
         for edges in find_edges(problem, position, batch_pairs=batch_pairs):
@@ -213,5 +214,5 @@ def _slices_of(problem: Problem, position: Array, edges: Edges, made: Provenance
 
 
 def roadmap_of(problem: Problem, position: Array, edges: Edges, made: Provenance, tally: Tally) -> Roadmap:
-    """A roadmap of nodes (n, 3) [m] and the edges of all of them, at the problem's one departure."""
+    """Return a roadmap of nodes (n, 3) [m] and the edges of all of them, at the problem's only departure."""
     return _slices_of(problem, position, edges, made, tally).at(0)

@@ -1,4 +1,4 @@
-"""What two roadmaps differ in: what made them, their nodes, their edges."""
+"""Compares two roadmaps: what made them, their nodes, their edges."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,14 +25,17 @@ WORDS = {
     "created": "created",
 }
 MOST_LINES = 40
+"""At most this many different lines of each scenario are shown."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """`made`: what made them differently, by name, with both values; `scenario`: the lines that only one has.
+    """The differences between two roadmaps.
 
-    `edges`: how many only the first has, only the second, and both; `times` [s]: the greatest difference in
-    the time of an edge that both have, and how many differ. None where nodes or departures are not the same.
+    `made` holds by name what made them, with both values, where these differ. `scenario` holds the lines that
+    only the first and only the second scenario has. `edges` are the numbers of edges only in the first, only in
+    the second, and in both. `times` are the greatest difference [s] in the time of an edge in both, and the
+    number of edges in both that differ. `edges` and `times` are None if nodes or departures are not the same.
     """
 
     made: dict[str, tuple[str, str]]
@@ -42,13 +45,13 @@ class Difference:
 
     @property
     def same_edges(self) -> bool:
-        """Whether both hold the same edges, to the bit."""
+        """Whether both have exactly the same edges, bit by bit."""
         return (
             self.edges is not None and self.edges[:2] == (0, 0) and self.times is not None and self.times[1] == 0
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a table for JSON."""
         edges = dict(zip(("only_first", "only_second", "both"), self.edges, strict=True)) if self.edges else None
         return {
             "made": {name: list(pair) for name, pair in self.made.items()},
@@ -65,9 +68,9 @@ class Difference:
             f"{name}: {first or 'not said'} | {second or 'not said'}"
             for name, (first, second) in self.made.items()
         ]
-        for mark, lines_of_one in zip("<>", self.scenario, strict=True):
-            lines += [f"{mark} {plain(line)}" for line in lines_of_one[:MOST_LINES]]
-            more = len(lines_of_one) - MOST_LINES
+        for mark, own_lines in zip("<>", self.scenario, strict=True):
+            lines += [f"{mark} {plain(line)}" for line in own_lines[:MOST_LINES]]
+            more = len(own_lines) - MOST_LINES
             lines += [f"{mark} ... {more} lines more"] if more > 0 else []
         if self.edges is None or self.times is None:
             lines.append("their nodes, or their departures, are not the same, so no edge is compared")
@@ -82,12 +85,12 @@ class Difference:
 
 
 def difference(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
-    """What differs between two roadmaps."""
+    """Return the differences between two roadmaps."""
     made = {}
-    for key, word in WORDS.items():
+    for key, name_shown in WORDS.items():
         values = getattr(first.provenance, key), getattr(second.provenance, key)
         if values[0] != values[1]:
-            made[word] = (values[0][:40], values[1][:40])
+            made[name_shown] = (values[0][:40], values[1][:40])
     texts = [road.provenance.scenario.splitlines() for road in (first, second)]
     unshared = tuple(
         tuple(line for line in text if line and line not in set(other)) for text, other in (texts, texts[::-1])
@@ -106,7 +109,7 @@ def difference(first: AnyRoadmap, second: AnyRoadmap) -> Difference:
 
 
 def _keys(road: AnyRoadmap) -> NDArray[np.int64]:
-    """A number for each edge, by its source, its slice and its target."""
+    """Return a unique number (edges,) for each source, slice and target."""
     nodes, rows = len(road.position), len(road.indptr) - 1
     require(nodes < 2**31, f"a roadmap of {nodes:,} nodes is too large to compare")
     return np.repeat(np.arange(rows, dtype=np.int64), np.diff(road.indptr)) * nodes + road.target

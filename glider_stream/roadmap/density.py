@@ -1,4 +1,4 @@
-"""How dense a roadmap is, in the vehicle's own measure: legs."""
+"""The density of a roadmap, measured in lengths of the vehicle's legs."""
 
 import math
 from dataclasses import dataclass
@@ -10,22 +10,24 @@ from ..base.arrays import Array, Index
 from .roadmap import Roadmap
 
 SECTORS = 36
-"""Directions that are told apart: 10 degrees each."""
+"""Directions are counted in this many sectors of 10 degrees each."""
 SAMPLED = 400
-"""Nodes that are looked at, evenly by their numbers."""
+"""At most this many nodes are examined, evenly chosen by their numbers."""
 AROUND = 8
-"""Nodes nearby, whose distance says how far nodes lie apart."""
+"""The spacing of nodes is found from the distance to this neighbour: the eighth nearest."""
 WIDEST = 1.15
-"""Nodes further apart, in legs, cost routes 7 % or more of their time (the table in docs/steering.md)."""
+"""If nodes lie further apart than this, in legs, routes take 7 % longer or more (table in docs/steering.md)."""
 FEWEST = 9.0
-"""Fewer directions than a lattice's eight, and one more: a route runs along them, and its fronts have corners."""
+"""A lattice has eight directions, and a route can only run along them. Fewer directions than this give a
+warning."""
 
 
 @dataclass(frozen=True)
 class Density:
-    """In how many `directions`, of 36, legs leave a node, and how far nodes at a depth lie apart.
+    """The mean number of `directions`, of 36, in which legs leave a node, and the spacing of nodes at one depth.
 
-    `spacing` [m]; `legs`: the same, in lengths of the fastest glide between the nodes' lowest and highest depth.
+    `spacing` is in m. `legs` is the spacing as a multiple of a leg: the horizontal length of the fastest glide
+    between the lowest and the highest node.
     """
 
     directions: float
@@ -34,7 +36,7 @@ class Density:
 
     @property
     def warning(self) -> str:
-        """What is too little, and what to do; empty if nothing is."""
+        """A sentence that says what is not dense enough and what to do; empty if all is dense enough."""
         found = []
         if self.legs > WIDEST:
             found.append(f"nodes lie {self.legs:.2g} legs apart, more than {WIDEST:g}")
@@ -52,7 +54,7 @@ class Density:
 
 
 def density_of(roadmap: Roadmap, best_angle: float) -> Density:
-    """The density of a roadmap; `best_angle` [rad] is that of the fastest glide."""
+    """Return the density of a roadmap; `best_angle` [rad] is the angle of the fastest glide."""
     position = roadmap.position
     some = np.unique(np.linspace(0, len(position) - 1, SAMPLED).astype(np.int64))
     directions = []
@@ -70,10 +72,10 @@ def density_of(roadmap: Roadmap, best_angle: float) -> Density:
 
 
 def _spacing(position: Array, some: Index) -> float:
-    """How far nodes (n, 3) [m] lie apart: the side of a square, or of a cube, that holds one."""
+    """Return the spacing [m] of nodes (n, 3) [m]: the side of a square, or of a cube, that holds one node."""
     levels = np.unique(position[:, 2])
     layered = len(levels) < len(position) ** 0.5
-    # layers are put so far apart that no other one is near
+    # put layers so far apart that nodes of other layers are never near
     scale = float(np.ptp(position[:, :2], axis=0).max()) + 1.0
     layer = np.searchsorted(levels, position[:, 2]) * 10 * scale if layered else position[:, 2]
     at = np.column_stack([position[:, :2], layer])

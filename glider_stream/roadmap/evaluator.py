@@ -1,4 +1,4 @@
-"""Edge evaluation for callers from Python: casts arrays, checks them, calls the kernels."""
+"""Edge evaluation for Python code: converts arrays, checks them, calls the kernels."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,14 +21,14 @@ from .bins import node_bins
 from .steering import FlowMapMethod, IntegrationSettings, Method
 
 NODES_AT_ONCE = 16
-"""Source nodes that a thread takes at once: few, since their work differs a hundredfold."""
+"""A thread takes this many source nodes at a time: only few, because their work differs by a factor of 100."""
 MOST_LEGS = 1024
-"""Legs of a node for which there is room at first."""
+"""At first there is room for at most this many legs of a node."""
 
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Everything that decides an edge but its ends: flow, terrain, glide polar, steering, integration, cost."""
+    """Everything that determines an edge, except its ends: flow, terrain, polar, steering, integration, cost."""
 
     flow: flow.Flow
     terrain: terrain.Terrain
@@ -45,13 +45,14 @@ class Evaluator:
         indptr: ArrayLike,
         target: ArrayLike,
     ) -> Array:
-        """Outcomes of all pairs (source[n], target[indptr[n]:indptr[n + 1]]): rows in the order of `Edge`.
+        """Return the outcomes (pairs, 7) of all pairs (source[n], target[indptr[n]:indptr[n + 1]]).
 
-        position (nodes, 3) [m]; departure (nodes,) [s] or one for all; source (n,), indptr (n + 1,),
-        target (pairs,) node numbers. Status first (see `Status`); time [s], cost, glide angle, heading [rad],
-        speed [m/s], miss [m], NaN where the pair is not connected.
+        position (nodes, 3) [m]; departure (nodes,) [s] or one value for all; source (n,), indptr (n + 1,) and
+        target (pairs,) with node numbers. The columns are the fields of `Edge`: status (see `Status`), time [s],
+        cost, glide angle, heading [rad], speed [m/s], miss [m]. All but the status are NaN if a pair is not
+        connected.
         """
-        # writeable arrays, always: Numba compiles read-only ones apart
+        # arrays are always writeable, because Numba would compile the kernels again for read-only arrays
         nodes = np.require(position, np.float64, ["C", "W"])
         require(nodes.ndim == 2 and nodes.shape[1] == 3, f"`position` must have shape (n, 3); got {nodes.shape}")
         require(bool(np.isfinite(nodes).all()), "`position` must be finite; got NaN or infinity")
@@ -83,7 +84,7 @@ class Evaluator:
 
     @property
     def medium(self) -> edges.Medium:
-        """As the kernels read it."""
+        """The same values in the form that the kernels read."""
         return edges.Medium(self.flow, self.terrain, self.polar, self.integration.kernel(), self.cost.kernel())
 
     @property
@@ -93,11 +94,11 @@ class Evaluator:
 
     @property
     def flies_backward(self) -> bool:
-        """Whether one fan, flown back in time, finds all legs to a point."""
+        """Whether one fan that is flown back in time can find all legs to a point."""
         return self.exact and is_steady(self.flow)
 
     def by_fan(self) -> "Evaluator":
-        """The same, steering by the flow map."""
+        """Return the same evaluator with steering by the flow map."""
         return self if self.exact else replace(self, steering=FlowMapMethod())
 
     def reach(
@@ -108,10 +109,11 @@ class Evaluator:
         limit: int,
         wanted: Bools | None = None,
     ) -> tuple[Index, Index, Array]:
-        """The legs from each of the nodes `source` to whatever lies under its fan: (indptr, target, outcomes).
+        """Return the legs from each node `source` to all nodes under its fan: (indptr, target, outcomes).
 
-        `departure` [s], one for all or (sources,). Only the fastest `limit` of each vertical direction, all where
-        it is 0; of all, those to the nodes `wanted` (sources, nodes). Targets rise within a row.
+        `departure` [s] is one value or (sources,). Only the fastest `limit` legs of each vertical direction are
+        returned, all legs if `limit` is 0. Only legs to the nodes marked in `wanted` (sources, nodes) are
+        searched, if it is given. Targets rise within a row.
         """
         points = _asking_for_all(position[source], departure, False)
         if wanted is not None:
@@ -120,9 +122,9 @@ class Evaluator:
         return self._reach(position, points, limit)
 
     def reach_point(self, position: Array, point: Array, departure: float, backward: bool) -> tuple[Index, Array]:
-        """The nodes that lie under the fan of a `point` (3,) [m], and the legs to them: (nodes, outcomes).
+        """Return the nodes under the fan of a `point` (3,) [m] and the legs to them: (nodes, outcomes).
 
-        With `backward`, in a steady flow, those that reach it, and the legs from them.
+        With `backward`, in a steady flow, return the nodes that reach the point and the legs from them.
         """
         return self._reach(position, _asking_for_all(np.reshape(point, (1, 3)), departure, backward), 0)[1:]
 
@@ -139,7 +141,7 @@ class Evaluator:
         while True:
             legs = Legs(counts, np.empty((count, room, LEG_COLUMNS)))
             task = partial(reach_points, self.medium, self.steering.kernel(), nodes, points, limit, legs)
-            # a search asks for few nodes at a time: all threads shall have some
+            # a search asks for few nodes at a time; each thread gets some of them
             in_parallel(task, count, max(1, min(NODES_AT_ONCE, count // NODES_AT_ONCE)))
             if counts.max(initial=0) <= room:
                 break
@@ -150,11 +152,11 @@ class Evaluator:
         return first, targets, np.ascontiguousarray(rows[:, LEG_EDGE:])
 
     def connect_pair(self, start: ArrayLike, goal: ArrayLike, departure: float = 0.0) -> Edge:
-        """The outcome of one pair of points (3,) [m]."""
+        """Return the outcome of one pair of points (3,) [m]."""
         return edge_of(self.connect(np.array([start, goal], np.float64), departure, [0], [0, 1], [1])[0])
 
     def trace(self, start: ArrayLike, edge: Edge, departure: float) -> Array:
-        """The path of an edge from `start` (3,) [m]: rows [t, x, y, z] to its closest approach."""
+        """Return the path of an edge from `start` (3,) [m]: rows [t, x, y, z] up to its closest approach."""
         through = control.control_of(edge.speed, edge.glide_angle, edge.heading)
         rows: Array = motion.traced(self.flow, _place(start, departure), through, edge.time, self.integration.dt)
         return rows
@@ -162,9 +164,9 @@ class Evaluator:
     def landings(
         self, start: ArrayLike, height: float, glide_angle: ArrayLike, heading: ArrayLike, departure: float = 0.0
     ) -> Array:
-        """Where controls from `start` (3,) [m] land at a height [m]: the flow map, x, y (n, 2) [m].
+        """Return the places x, y (n, 2) [m] where controls from `start` (3,) [m] reach a height [m].
 
-        `glide_angle` (its magnitude) and `heading` [rad] (n,).
+        `glide_angle` is the magnitude of the angle, (n,) [rad]; `heading` (n,) [rad].
         """
         origin = _place(start, departure)
         require(height != origin.z, f"a control cannot land at its own height; got {height:g} m for both")
@@ -175,13 +177,13 @@ class Evaluator:
         return where
 
     def control_line(self, start: ArrayLike, goal: ArrayLike, candidates: int, departure: float = 0.0) -> Array:
-        """The pair's controls on its control line: magnitude of the glide angle and heading (n, 2) [rad]."""
+        """Return a pair's controls on its control line: magnitude of the glide angle and heading (n, 2) [rad]."""
         pair = Pair(_place(start, departure), _place(goal, departure))
         where: Array = connect.line_controls(self.medium, control.Streamline(candidates), pair)
         return where
 
     def allowed(self, points: Array, t: float = 0.0) -> NDArray[np.bool_]:
-        """Which points (n, 3) [m] lie in the flow and in open water at time t [s]."""
+        """Return a mask (n,) of the points (n, 3) [m] that lie in the flow and in open water at time t [s]."""
         return np.array(
             [
                 flow.contains(self.flow, x, y, t) and terrain.allowed(self.terrain, x, y, z)
@@ -197,7 +199,7 @@ def _place(point: ArrayLike, t: float) -> Place:
 
 
 def _asking_for_all(position: Array, departure: float | Array, backward: bool) -> Points:
-    """Points (n, 3) [m] that ask for all nodes under their fans."""
+    """Return points from `position` (n, 3) [m] that ask for all nodes under their fans."""
     nobody = np.empty(0, np.int64)
     places = np.require(position, np.float64, ["C", "W"])
     return Points(places, np.full(len(places), departure, np.float64), backward, nobody, nobody)

@@ -1,4 +1,4 @@
-"""Slices of a roadmap: the legs of some nodes at many departures, each from those of the one before."""
+"""Slices of a roadmap: finds the legs of some nodes at many departures, each from the legs at the one before."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,14 +20,15 @@ from .pairs import Found, NeighbourLegs, ReachableLegs
 from .problem import Problem
 
 FAN_EVERY = 12
-"""Every so many slices a fan looks for all legs again; between, they are followed."""
+"""After this many slices a fan finds all legs again; at the slices between, the legs are followed."""
 FEW = 48
-"""A node that has fewer legs gets a fan each time: their targets lie so far apart that none leads to the next."""
+"""A node with fewer legs gets a fan at every departure: its targets lie too far apart to lead to each other."""
 BESIDE, ABOVE = 8, 1
-"""Nodes near each, to which its legs lead on: on its depth, and on the next depth above and below."""
+"""The legs of a node are tried for this many nodes near each target: at its depth, and at the depths above and
+below."""
 ROOM = 2.0
-"""Room for a node's legs, in those that it had at the departure before; where it is too small, all are followed
-once more. A third more pairs are looked at than hold."""
+"""There is room for this many times the legs that a node had at the departure before. If the room is too small,
+all legs are followed again. About a third more pairs are tried than connect."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,11 @@ class Held:
 
 
 def nodes_near(position: Array) -> Index:
-    """Nodes near each of the nodes (n, 3) [m]: (n, any); a node itself where there are not so many."""
+    """Return the numbers (n, near) of nodes near each node (n, 3) [m]; the node itself fills empty places."""
     depths, layer = np.unique(position[:, 2], return_inverse=True)
     everyone = np.arange(len(position))
     if depths.size > MAX_LEVELS:
-        # nodes at any depth: in a box of equal sides those around are as far each way
+        # nodes at any depth: scale the box to equal sides, so that distances count alike in all directions
         sides = np.ptp(position, axis=0)
         points = position / np.where(sides > 0, sides, 1.0)
         return _nearest(points, everyone, points, everyone, BESIDE + 2 * ABOVE)
@@ -53,19 +54,19 @@ def nodes_near(position: Array) -> Index:
     for number, nodes in enumerate(layers):
         near[nodes, :BESIDE] = _nearest(at[nodes], nodes, at[nodes], nodes, BESIDE)
         for column, other in ((BESIDE, number - 1), (BESIDE + ABOVE, number + 1)):
-            there = layers[other] if 0 <= other < depths.size else nodes
-            near[nodes, column : column + ABOVE] = _nearest(at[there], there, at[nodes], nodes, ABOVE)
+            beside = layers[other] if 0 <= other < depths.size else nodes
+            near[nodes, column : column + ABOVE] = _nearest(at[beside], beside, at[nodes], nodes, ABOVE)
     return near
 
 
-def _nearest(points: Array, numbers: Index, at: Array, own: Index, count: int) -> Index:
-    """The `count` nearest `numbers` of `points` to each place, its own number left out where that is there."""
+def _nearest(points: Array, numbers: Index, at: Array, itself: Index, count: int) -> Index:
+    """Return the numbers (n, count) of the points nearest to each place; the place's own number is left out."""
     asked = min(count + 1, len(points))
     _, found = KDTree(points).query(at, k=np.arange(1, asked + 1))
     chosen = numbers[found]
-    result = np.repeat(own[:, None], count, axis=1)
-    # an own number goes last, and is cut off
-    order = np.argsort(chosen == own[:, None], axis=1, kind="stable")
+    result = np.repeat(itself[:, None], count, axis=1)
+    # the place's own number goes last and is cut off
+    order = np.argsort(chosen == itself[:, None], axis=1, kind="stable")
     kept = np.take_along_axis(chosen, order, axis=1)[:, :count]
     result[:, : kept.shape[1]] = kept
     return result
@@ -83,11 +84,11 @@ class Follower:
 
     @staticmethod
     def of(problem: Problem, position: Array) -> "Follower":
-        """A follower for nodes (n, 3) [m]."""
+        """Return a follower for nodes (n, 3) [m]."""
         return Follower(problem, position, nodes_near(position))
 
     def slices(self, source: Index) -> Iterator[Found]:
-        """The pairs from the nodes `source` at each departure; each node's depend on nothing but itself."""
+        """Yield the pairs from the nodes `source` at each departure; each node is independent of the others."""
         exact = self.problem.evaluator.exact
         held: Held | None = None
         before = 0.0
@@ -130,16 +131,16 @@ class Follower:
             if counts.max(initial=0) <= room:
                 break
             room = int(counts.max())
-        there = np.arange(room) < counts[:, None]
-        going = there & (rows[:, :, follow.LEG_STATUS] != Status.NO_HIT)
-        pairs = self._pairs(evaluator, source, departure, rows, there, indptr, target)
+        filled = np.arange(room) < counts[:, None]
+        going = filled & (rows[:, :, follow.LEG_STATUS] != Status.NO_HIT)
+        pairs = self._pairs(evaluator, source, departure, rows, filled, indptr, target)
         return pairs, _packed(rows, going)
 
     def _pairs(
-        self, evaluator: Evaluator, source: Index, departure: float, rows: Array, there: Bools, *asked: Index
+        self, evaluator: Evaluator, source: Index, departure: float, rows: Array, filled: Bools, *asked: Index
     ) -> Found:
-        """All pairs that were looked at; of a neighbour law all that it names."""
-        edges = there & (rows[:, :, follow.LEG_CHOSEN] > 0)
+        """Return all pairs that were tried; with a neighbour law, all pairs that it proposes."""
+        edges = filled & (rows[:, :, follow.LEG_CHOSEN] > 0)
         chosen = rows[edges]
         outcomes = np.ascontiguousarray(chosen[:, LEG_EDGE:LEG_COLUMNS])
         outcomes[outcomes[:, STATUS] != Status.CONNECTED, TIME:] = np.nan
@@ -156,41 +157,41 @@ class Follower:
 
 
 def _held(found: Found) -> Held:
-    """Legs that a fan has found, as they are followed: of their flow maps nothing is known."""
+    """Return the legs of a fan in the form in which they are followed; their flow maps are not known yet."""
     counts = np.diff(found.indptr)
     rows = np.zeros((len(counts), int(counts.max(initial=0)), follow.FOLLOWED_COLUMNS))
-    there = np.arange(rows.shape[1]) < counts[:, None]
+    filled = np.arange(rows.shape[1]) < counts[:, None]
     flat = np.zeros((found.target.size, follow.FOLLOWED_COLUMNS))
     flat[:, LEG_NODE] = found.target
     flat[:, LEG_EDGE:LEG_COLUMNS] = found.outcomes
-    rows[there] = flat
-    return _packed(rows, there & (rows[:, :, follow.LEG_STATUS] == Status.CONNECTED))
+    rows[filled] = flat
+    return _packed(rows, filled & (rows[:, :, follow.LEG_STATUS] == Status.CONNECTED))
 
 
 def _packed(rows: Array, kept: Bools) -> Held:
-    """Some of the rows of each node, side by side."""
+    """Return only the `kept` rows of each node, without gaps."""
     counts = kept.sum(axis=1).astype(np.int64)
     packed = np.zeros((len(rows), int(counts.max(initial=0)), rows.shape[2]))
     packed[np.arange(packed.shape[1]) < counts[:, None]] = rows[kept]
     return Held(packed, counts)
 
 
-def _joined(chosen: Bools, one: Found, other: Found) -> Found:
-    """The pairs of the `chosen` nodes and of the others, in the order of the nodes."""
+def _joined(chosen: Bools, first: Found, other: Found) -> Found:
+    """Return the pairs of the `chosen` nodes (`first`) and of the others, in the order of the nodes."""
     degree = np.empty(chosen.size, np.int64)
-    degree[chosen], degree[~chosen] = np.diff(one.indptr), np.diff(other.indptr)
+    degree[chosen], degree[~chosen] = np.diff(first.indptr), np.diff(other.indptr)
     mine = np.repeat(chosen, degree)
     target, outcomes = np.empty(mine.size, np.int64), np.empty((mine.size, EDGE_COLUMNS))
-    target[mine], target[~mine] = one.target, other.target
-    outcomes[mine], outcomes[~mine] = one.outcomes, other.outcomes
+    target[mine], target[~mine] = first.target, other.target
+    outcomes[mine], outcomes[~mine] = first.outcomes, other.outcomes
     return Found(np.concatenate([[0], np.cumsum(degree)]), target, outcomes)
 
 
-def _side_by_side(chosen: Bools, one: Held, other: Held) -> Held:
-    """The legs of the `chosen` nodes and of the others, in the order of the nodes."""
-    room = max(one.rows.shape[1], other.rows.shape[1])
+def _side_by_side(chosen: Bools, first: Held, other: Held) -> Held:
+    """Return the legs of the `chosen` nodes (`first`) and of the others, in the order of the nodes."""
+    room = max(first.rows.shape[1], other.rows.shape[1])
     rows, counts = np.zeros((chosen.size, room, follow.FOLLOWED_COLUMNS)), np.empty(chosen.size, np.int64)
-    for where, part in ((chosen, one), (~chosen, other)):
+    for where, part in ((chosen, first), (~chosen, other)):
         counts[where] = part.counts
         rows[np.flatnonzero(where), : part.rows.shape[1]] = part.rows
     return Held(rows, counts)

@@ -1,4 +1,4 @@
-"""The files that a scenario reads: known again by their content, wherever they and the roadmap have gone."""
+"""The files that a scenario reads; they are found again by their content after they or the roadmap were moved."""
 
 import hashlib
 import json
@@ -12,18 +12,18 @@ from ..base.errors import InputError
 from ..base.toml import check_depth, to_toml
 
 KEYS = {"flow": ("file",), "terrain": ("bathymetry", "keep_out")}
-"""Per section of a scenario, the keys whose values name files."""
+"""For each section of a scenario, the keys whose values are file names."""
 LOOKED_AT = 1 << 20
-"""Bytes at either end of a file that, with its size, tell it from others; what it holds is compared later."""
+"""A file is recognised by its size and this many bytes at each end; its whole content is compared later."""
 MOST_BESIDE = 10_000
-"""Files beside a roadmap that are looked at."""
+"""At most this many files beside a roadmap are examined."""
 
 Names = Mapping[str, tuple[str, ...]]
 """File names by section.key."""
 
 
 def names_of(table: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """The files that a scenario's table names, by section.key."""
+    """Return the names of the files in a scenario's table, by section.key."""
     found = {}
     for section, keys in KEYS.items():
         block = table.get(section)
@@ -35,7 +35,7 @@ def names_of(table: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def renamed(table: Mapping[str, Any], names: Names) -> dict[str, Any]:
-    """A scenario's table with other names for its files."""
+    """Return a scenario's table with new names for its files."""
     result = {name: dict(block) if isinstance(block, Mapping) else block for name, block in table.items()}
     for place, files in names.items():
         section, key = place.split(".")
@@ -44,7 +44,7 @@ def renamed(table: Mapping[str, Any], names: Names) -> dict[str, Any]:
 
 
 def settings_sha256(text: str) -> str:
-    """A digest of a scenario without the names of its files, whose content has digests of its own."""
+    """Return a digest of a scenario without its file names; the files' content has other digests."""
     try:
         table = tomllib.loads(text)
         check_depth(table, "the scenario")
@@ -57,7 +57,7 @@ def settings_sha256(text: str) -> str:
 
 
 def fingerprint(path: Path) -> str:
-    """What tells a file, or a Zarr store, from others, quickly; "" where it cannot be read."""
+    """Return a quick fingerprint of a file or a Zarr store; "" if it cannot be read."""
     text = hashlib.sha256()
     try:
         if path.is_dir():
@@ -82,7 +82,7 @@ def fingerprint(path: Path) -> str:
 
 
 def inputs_of(names: Names, folder: Path) -> str:
-    """What a roadmap that is made in a folder keeps of its files, as JSON."""
+    """Return, as JSON, the names and fingerprints of the files that a roadmap in `folder` was made from."""
     files = {
         place: [{"name": name, "fingerprint": fingerprint(Path(name))} for name in some]
         for place, some in names.items()
@@ -91,15 +91,15 @@ def inputs_of(names: Names, folder: Path) -> str:
 
 
 def located(names: Names, inputs: str, folder: Path) -> dict[str, tuple[str, ...]]:
-    """Where the files of a roadmap that now lies in `folder` are; `inputs` as `inputs_of` made it.
+    """Return the places of the files of a roadmap that now lies in `folder`; `inputs` comes from `inputs_of`.
 
-    A file is looked for where it was, where it was as seen from the roadmap, and beside the roadmap, by its name
-    and then by its content. InputError, with the cure, if it is nowhere.
+    A file is searched at its old place, at its old place relative to the roadmap, and beside the roadmap, by its
+    name and then by its content. InputError, with the cure, if it is not found.
     """
     try:
-        told = json.loads(inputs) if inputs else {}
-        before, files = Path(told.get("folder", "")), told.get("files", {})
-        marks = {place: [str(one["fingerprint"]) for one in some] for place, some in files.items()}
+        kept = json.loads(inputs) if inputs else {}
+        before, files = Path(kept.get("folder", "")), kept.get("files", {})
+        marks = {place: [str(file["fingerprint"]) for file in some] for place, some in files.items()}
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         before, marks = Path(), {}
     result = {}
@@ -113,18 +113,18 @@ def located(names: Names, inputs: str, folder: Path) -> dict[str, tuple[str, ...
 
 
 def _found(place: str, name: str, mark: str, before: Path, folder: Path) -> str:
-    there = []
+    existing = []
     for path in _candidates(name, before, folder):
         if path.exists():
-            there.append(path)
+            existing.append(path)
             if mark and fingerprint(path) == mark:
                 return str(path)
     if mark:
         for path in _beside(folder):
             if fingerprint(path) == mark:
                 return str(path)
-    if there:
-        return str(there[0])  # what it holds is compared with what the roadmap was built with
+    if existing:
+        return str(existing[0])  # what it holds is compared with what the roadmap was built with
     raise InputError(
         f"the file {name} of `{place}` does not exist, nor does one of its name or content beside the roadmap; "
         f"say where it is with --set {place}=FILE"
@@ -139,7 +139,7 @@ def _candidates(name: str, before: Path, folder: Path) -> Iterator[Path]:
 
 
 def _beside(folder: Path) -> Iterator[Path]:
-    """What lies in a folder: files, and folders that are Zarr stores."""
+    """Yield the files in a folder, and its folders that are Zarr stores."""
     try:
         entries = sorted(folder.iterdir())[:MOST_BESIDE]
     except OSError:

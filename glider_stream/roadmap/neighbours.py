@@ -1,4 +1,4 @@
-"""Neighbour laws: which pairs of nodes are worth a look. Only nodes at other depths are."""
+"""Neighbour laws: they choose the pairs of nodes that are evaluated, always nodes at different depths."""
 
 import math
 from collections.abc import Iterable
@@ -13,18 +13,18 @@ from ..base.settings import require
 
 
 class Neighbourhood(Protocol):
-    """A law, ready for one set of nodes."""
+    """A neighbour law, prepared for one set of nodes."""
 
     def of(self, point: Array) -> Index:
-        """Neighbours of a point (3,) [m] among the nodes at other depths, rising."""
+        """Return the neighbours of a point (3,) [m] among the nodes at other depths; their numbers rise."""
         ...
 
 
 class NeighbourLaw(Protocol):
-    """A law of neighbours; the same for a node, a start and a goal."""
+    """A law that chooses neighbours; it is the same for a node, a start and a goal."""
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """The law for nodes (n, 3) [m] that fill a `volume` [m^3]."""
+        """Return the law for nodes (n, 3) [m] that fill a `volume` [m^3]."""
         ...
 
 
@@ -41,7 +41,7 @@ class Nearest:
         )
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """The neighbours among nodes (n, 3) [m] that fill a `volume` [m^3]."""
+        """Return the law for nodes (n, 3) [m] that fill a `volume` [m^3]."""
         k = math.ceil(math.e * (4 / 3) * math.log(max(len(position), 2))) if self.k == "prm*" else int(self.k)
         return _Nearest(KDTree(position), k)
 
@@ -57,7 +57,7 @@ class _Nearest:
             asked = min(asked, self.tree.n)
             distance, index = map(np.asarray, self.tree.query(point, k=np.arange(1, asked + 1)))
             other = self.tree.data[index, 2] != point[2]
-            # equal distances are common on a grid, the lower index goes first: all of them must be there
+            # on a grid equal distances are common; the lower index goes first, so all of them must be found
             if (distance[other] < distance[-1]).sum() >= self.k or asked == self.tree.n:
                 order = np.lexsort((index[other], distance[other]))[: self.k]
                 return np.sort(index[other][order])
@@ -78,7 +78,7 @@ class Radius:
         require(fits, f'`neighbours.radius` must be above 0, or "prm*"; got {self.radius}')
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """The neighbours among nodes (n, 3) [m] that fill a `volume` [m^3]."""
+        """Return the law for nodes (n, 3) [m] that fill a `volume` [m^3]."""
         n = max(len(position), 2)
         unit_ball = 4 / 3 * math.pi
         prm_star = 2 * (4 / 3 * volume / unit_ball * math.log(n) / n) ** (1 / 3)
@@ -100,7 +100,7 @@ class AllNodes:
     """Every node at another depth."""
 
     def among(self, position: Array, volume: float) -> Neighbourhood:
-        """The neighbours among nodes (n, 3) [m] that fill a `volume` [m^3]."""
+        """Return the law for nodes (n, 3) [m] that fill a `volume` [m^3]."""
         return _All(position)
 
 
@@ -114,7 +114,7 @@ class _All:
 
 @dataclass(frozen=True)
 class Reachable:
-    """The nodes that the flow map says a node can reach; the fastest `limit` down and as many up, 0 for all."""
+    """All nodes that a node can reach by the flow map: the fastest `limit` down and `limit` up; 0 means all."""
 
     limit: int = 0
 
@@ -131,7 +131,7 @@ NEIGHBOURS: dict[str, type[NeighbourLaw | Reachable]] = {
 
 
 def as_csr(rows: Iterable[Index]) -> tuple[Index, Index]:
-    """Rows of targets as (indptr, target)."""
+    """Return rows of targets in CSR form: (indptr, target)."""
     rows = list(rows)
     indptr = np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
     return indptr, np.concatenate([np.empty(0, np.int64), *rows])

@@ -1,4 +1,4 @@
-"""Node samplers: where a roadmap's nodes lie in a box."""
+"""Node samplers: they choose the places of a roadmap's nodes in a box."""
 
 import math
 from collections.abc import Callable
@@ -12,24 +12,25 @@ from ..base.arrays import Array
 from ..base.settings import require
 
 Allowed = Callable[[Array], NDArray[np.bool_]]
-"""Says which of the points (n, 3) [m] may be nodes."""
+"""A function that returns a mask (n,) of the points (n, 3) [m] that may be nodes."""
 
 
 MOST_NODES = 10_000_000
 """A roadmap with more nodes does not fit into memory."""
 MOST_DRAWN = 4 * MOST_NODES
-"""Points that are drawn in search of open water, at most: they are held at once."""
+"""At most this many points are drawn to find open water, because all are in memory at once."""
 
 
 def cells_along(lo: Array, hi: Array, spacing: Array) -> list[int]:
-    """How many even cells, about `spacing` (d,) wide, fill a box lo..hi (d,) along each axis."""
+    """Return the number of equal cells, about `spacing` (d,) wide, along each axis of a box lo..hi (d,)."""
     return [max(1, round(float(wide / step))) for wide, step in zip(hi - lo, spacing, strict=True)]
 
 
 def jittered(lo: Array, hi: Array, spacing: Array, random: np.random.Generator | None) -> Array:
-    """Points (n, d), one anywhere in each of the even cells, about `spacing` (d,) wide, of a box lo..hi (d,).
+    """Return points (n, d), one in each of the equal cells, about `spacing` (d,) wide, of a box lo..hi (d,).
 
-    Unlike those of a lattice they lie in all directions from each other. In the middles if `random` is None.
+    A point lies at a random place of its cell, or in the middle if `random` is None. Unlike the points of a
+    lattice, random points lie in all directions from each other.
     """
     counts = cells_along(lo, hi, spacing)
     cells = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, len(counts))
@@ -38,7 +39,7 @@ def jittered(lo: Array, hi: Array, spacing: Array, random: np.random.Generator |
 
 
 class Sampler(Protocol):
-    """A way to place nodes; `seed` is 0 where no random numbers are used."""
+    """A way to place nodes; `seed` is 0 if it uses no random numbers."""
 
     @property
     def seed(self) -> int:
@@ -46,13 +47,13 @@ class Sampler(Protocol):
         ...
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """Points (n, 3) [m] in the box lo..hi (3,) [m]."""
+        """Return the nodes (n, 3) [m] in the box lo..hi (3,) [m]."""
         ...
 
 
 @dataclass(frozen=True)
 class GridSampler:
-    """A regular grid: cell-centred in x and y, levels from end to end in z; points on land are left out."""
+    """A regular grid: the middles of cells in x and y, levels from top to bottom in z; no points on land."""
 
     shape: tuple[int, int, int]
     seed = 0
@@ -64,7 +65,7 @@ class GridSampler:
         require(fits, f"`sampling.shape` = {list(self.shape)} is {size:,} nodes; take at most {MOST_NODES:,}")
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """Points (n, 3) [m] in the box lo..hi: x varies slowest, z fastest, from the surface down."""
+        """Return the nodes (n, 3) [m] in the box lo..hi: x varies slowest, z fastest, from the surface down."""
         nx, ny, nz = self.shape
         x = lo[0] + (np.arange(nx) + 0.5) / nx * (hi[0] - lo[0])
         y = lo[1] + (np.arange(ny) + 0.5) / ny * (hi[1] - lo[1])
@@ -75,7 +76,7 @@ class GridSampler:
 
 @dataclass(frozen=True)
 class RandomSampler:
-    """`count` points drawn from a seeded sequence; points on land are drawn again."""
+    """`count` points of a seeded random sequence; points on land are replaced by later points."""
 
     count: int
     seed: int
@@ -86,11 +87,11 @@ class RandomSampler:
         require(self.seed >= 0, f"`sampling.seed` must be at least 0; got {self.seed}")
 
     def draw(self, count: int) -> Array:
-        """The first `count` points (count, 3) of the sequence in the unit cube."""
+        """Return the first `count` points (count, 3) of the sequence in the unit cube."""
         return np.random.default_rng(self.seed).random((count, 3))
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """Points (count, 3) [m] in the box lo..hi, in the order of the sequence."""
+        """Return the nodes (count, 3) [m] in the box lo..hi, in the order of the sequence."""
         drawn = self.count
         while True:
             points = lo + self.draw(drawn) * (hi - lo)
@@ -110,8 +111,8 @@ class SobolSampler(RandomSampler):
     """A scrambled Sobol sequence."""
 
     def draw(self, count: int) -> Array:
-        """The first `count` points (count, 3) of the sequence in the unit cube."""
-        from scipy.stats import qmc  # half of a query's start-up, and few scenarios draw from it
+        """Return the first `count` points (count, 3) of the sequence in the unit cube."""
+        from scipy.stats import qmc  # the import takes half of a query's start-up time, and few scenarios need it
 
         powers = (count - 1).bit_length()
         return np.asarray(qmc.Sobol(3, rng=np.random.default_rng(self.seed)).random_base2(powers)[:count])
@@ -122,7 +123,7 @@ class HaltonSampler(RandomSampler):
     """A scrambled Halton sequence."""
 
     def draw(self, count: int) -> Array:
-        """The first `count` points (count, 3) of the sequence in the unit cube."""
+        """Return the first `count` points (count, 3) of the sequence in the unit cube."""
         from scipy.stats import qmc
 
         return np.asarray(qmc.Halton(3, rng=np.random.default_rng(self.seed)).random(count))
@@ -130,10 +131,11 @@ class HaltonSampler(RandomSampler):
 
 @dataclass(frozen=True)
 class YoSampler:
-    """Nodes at the `depths` [m] that yos turn at: one every `spacing` [m] in x and y, or `per_leg` to a leg.
+    """Nodes at the `depths` [m] at which yos turn, one every `spacing` [m], or `per_leg` nodes per leg.
 
-    A leg's length is that of the fastest glide between the depths furthest apart, dz / tan(gamma). With `jitter`
-    a node lies anywhere in its cell, by `seed`, so that legs lead in all directions; else in the middle.
+    The length of a leg is that of the fastest glide between the two neighbouring depths that are furthest apart,
+    dz / tan(gamma). With `jitter` a node lies at a random place of its cell, by `seed`, so that legs lead in all
+    directions; otherwise it lies in the middle.
     """
 
     depths: tuple[float, ...]
@@ -151,14 +153,14 @@ class YoSampler:
         require(given[0] > 0, f"`sampling.spacing`, or `per_leg`, must be above 0; got {given[0]:g}")
 
     def for_glide(self, angle: float) -> "YoSampler":
-        """The same with its spacing known: `angle` [rad] is that of the fastest glide."""
+        """Return the sampler with its spacing set; `angle` [rad] is the angle of the fastest glide."""
         if self.per_leg is None:
             return self
         leg = float(np.diff(self.depths).max()) / math.tan(angle)
         return replace(self, spacing=leg / self.per_leg, per_leg=None)
 
     def nodes(self, lo: Array, hi: Array, allowed: Allowed) -> Array:
-        """Points (n, 3) [m] in the box lo..hi, depth by depth from the shallowest down."""
+        """Return the nodes (n, 3) [m] in the box lo..hi, depth by depth from the shallowest down."""
         assert self.spacing is not None
         deepest, most = max(self.depths), -float(lo[2])
         require(deepest <= most, f"`sampling.depths` reach {deepest:g} m, the domain {most:g} m; deepen it")

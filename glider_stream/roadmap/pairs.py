@@ -1,4 +1,4 @@
-"""Legs: what a neighbour law and a steering method find together, from nodes, from a point, to a point."""
+"""Legs: a neighbour law and a steering method together find legs from nodes, from a point and to a point."""
 
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -11,12 +11,12 @@ from .evaluator import Evaluator
 from .neighbours import Neighbourhood, NeighbourLaw, Reachable, as_csr
 
 SAMPLED = 16
-"""Nodes whose pairs are counted before any work is cut."""
+"""The pairs of this many nodes are counted before work is divided into batches."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """Pairs that were looked at: CSR `indptr` (sources + 1,), `target` (pairs,), `outcomes` (pairs, 7)."""
+    """Pairs that were evaluated: CSR `indptr` (sources + 1,), `target` (pairs,), `outcomes` (pairs, 7)."""
 
     indptr: Index
     target: Index
@@ -25,44 +25,44 @@ class Found:
 
 @dataclass(frozen=True)
 class Attached:
-    """Pairs of one point with nodes (n,), either way; `outcomes` (n, 7): rows of Edge's fields."""
+    """Pairs between one point and `nodes` (n,), in either direction; `outcomes` (n, 7) are rows of `Edge`."""
 
     nodes: Index
     outcomes: Array
 
 
 class Legs(Protocol):
-    """How legs between the nodes of a roadmap, and points beside it, are found."""
+    """Finds legs between the nodes of a roadmap, and between nodes and other points."""
 
     @property
     def pairs_per_node(self) -> int:
-        """Some number of pairs that a node makes, to cut work by."""
+        """A typical number of pairs of a node; work is divided by it."""
         ...
 
     def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
-        """Pairs from the nodes `source`, no node twice, left at `departure` (sources,) [s] or at the problem's.
+        """Return pairs from the nodes `source` at `departure` (sources,) [s], or at the problem's if it is None.
 
-        Where `wanted` (sources, nodes) is given, others may be left out.
+        No node occurs twice in `source`. If `wanted` (sources, nodes) is given, other pairs may be left out.
         """
         ...
 
     def away(self, point: Array, departure: float | None = None) -> Attached:
-        """Pairs from a point (3,) [m] to nodes, left at `departure` [s] or at the problem's."""
+        """Return pairs from a point (3,) [m] to nodes at `departure` [s], or at the problem's if it is None."""
         ...
 
     def before(self, point: Array) -> Index:
-        """The nodes, rising, from which a leg to a point (3,) [m] is looked for."""
+        """Return the nodes, with rising numbers, from which a leg to a point (3,) [m] is searched."""
         ...
 
     def towards(self, point: Array) -> Attached:
-        """Pairs from nodes to a point (3,) [m]."""
+        """Return pairs from nodes to a point (3,) [m]."""
         ...
 
 
 def legs_of(
     law: NeighbourLaw | Reachable, evaluator: Evaluator, position: Array, volume: float, departure: float
 ) -> Legs:
-    """The legs of a law and a method among nodes (n, 3) [m] that fill a `volume` [m^3]."""
+    """Return the object that finds legs by a law and a method among nodes (n, 3) [m] in a `volume` [m^3]."""
     if isinstance(law, Reachable):
         return ReachableLegs(evaluator, position, departure, law.limit)
     return NeighbourLegs(evaluator, position, departure, law.among(position, volume))
@@ -79,12 +79,12 @@ class NeighbourLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """The most pairs that one of some nodes makes; these nodes lie far apart in the order."""
+        """The greatest number of pairs of a node, over some nodes that lie far apart in the order."""
         some = np.linspace(0, len(self.position) - 1, SAMPLED).astype(np.int64)
         return max(1, *(len(self.neighbourhood.of(self.position[n])) for n in some))
 
     def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
-        """As Legs says."""
+        """Return pairs from the nodes `source`, no node twice; see `Legs.of`."""
         rows = [self.neighbourhood.of(self.position[n]) for n in source]
         if wanted is not None:
             rows = [row[some[row]] for row, some in zip(rows, wanted, strict=True)]
@@ -94,16 +94,16 @@ class NeighbourLegs:
         return Found(indptr, target, outcomes)
 
     def away(self, point: Array, departure: float | None = None) -> Attached:
-        """As Legs says."""
+        """Return pairs from a point (3,) [m] to nodes at `departure` [s], or at the problem's if it is None."""
         nodes = self.neighbourhood.of(point)
         return _from_point(self.evaluator, self.position, nodes, point, _or(departure, self.departure))
 
     def before(self, point: Array) -> Index:
-        """As Legs says."""
+        """Return the nodes, with rising numbers, from which a leg to a point (3,) [m] is searched."""
         return self.neighbourhood.of(point)
 
     def towards(self, point: Array) -> Attached:
-        """Pairs from nodes to a point (3,) [m]; by one fan backward in time where method and flow allow it."""
+        """Return pairs from nodes to a point (3,) [m]; by one fan back in time if method and flow allow it."""
         nodes = self.neighbourhood.of(point)
         if self.evaluator.flies_backward:
             found, outcomes = self.evaluator.reach_point(self.position[nodes], point, self.departure, True)
@@ -113,7 +113,7 @@ class NeighbourLegs:
 
 @dataclass(frozen=True)
 class ReachableLegs:
-    """Legs to the nodes that a fan reaches, the fastest `limit` of each vertical direction."""
+    """Legs to the nodes that a fan reaches: the fastest `limit` of each vertical direction; 0 means all."""
 
     evaluator: Evaluator
     position: Array
@@ -126,11 +126,11 @@ class ReachableLegs:
 
     @property
     def pairs_per_node(self) -> int:
-        """Twice the limit; all nodes where no limit is set."""
+        """Twice the limit; the number of all nodes if the limit is 0."""
         return 2 * self.limit if self.limit else len(self.position)
 
     def of(self, source: Index, departure: Array | None = None, wanted: Bools | None = None) -> Found:
-        """As Legs says; with a limit the fastest are found among all."""
+        """Return pairs from the nodes `source`; see `Legs.of`. With a limit, `wanted` is ignored."""
         departs = self.departure if departure is None else departure
         some = wanted if self.limit == 0 else None
         indptr, target, outcomes = self._fan.reach(self.position, departs, source, self.limit, some)
@@ -140,7 +140,7 @@ class ReachableLegs:
         return Found(indptr, target, outcomes)
 
     def away(self, point: Array, departure: float | None = None) -> Attached:
-        """As Legs says; all that are reached."""
+        """Return pairs from a point (3,) [m] to all nodes that it reaches; see `Legs.away`."""
         departs = _or(departure, self.departure)
         nodes, outcomes = self._fan.reach_point(self.position, point, departs, False)
         if not self.evaluator.exact:
@@ -148,11 +148,11 @@ class ReachableLegs:
         return Attached(nodes, outcomes)
 
     def before(self, point: Array) -> Index:
-        """As Legs says; all at other depths."""
+        """Return the numbers of all nodes at other depths than a point (3,) [m]."""
         return np.flatnonzero(self.position[:, 2] != point[2])
 
     def towards(self, point: Array) -> Attached:
-        """Pairs to a point (3,) [m] from all nodes that reach it."""
+        """Return pairs to a point (3,) [m] from all nodes that reach it."""
         if not is_steady(self.evaluator.flow):
             return _each_towards(self.evaluator, self.position, self.before(point), point, self.departure)
         nodes, outcomes = self._fan.reach_point(self.position, point, self.departure, True)
@@ -166,7 +166,7 @@ def _or(departure: float | None, usual: float) -> float:
 
 
 def _by_node(position: Array, source: Index, departure: Array) -> Array:
-    """Departures [s] of some nodes as the evaluator takes them: one for every node, others' never read."""
+    """Return departures [s] for all nodes, as the evaluator needs them; only those of `source` are read."""
     departs = np.zeros(len(position))
     departs[source] = departure
     return departs

@@ -1,4 +1,4 @@
-"""The problem: a scenario made into objects."""
+"""The problem: the objects that a scenario describes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,13 +18,14 @@ from .pairs import Legs, legs_of
 
 @dataclass(frozen=True)
 class Problem:
-    """A scenario made into objects: what `build` and `query` need.
+    """The objects that a scenario describes; `build` and `query` need them.
 
-    `lo`, `hi` (3,) [m]: the box of nodes. `departure` [s]: when a glider leaves a node. `to_lonlat` turns
-    x, y [m] into degrees where the scenario is geographic. `departs`: the departure's date and time (UTC),
-    where known. `frozen`: queries take every leg as at the departure, though the flow changes; `bins` [s]:
-    queries keep ways to one node apart that arrive in different bins of time. `flow_words`, `glider_words` say
-    what they are. `domain` is that of the scenario. `slices`: departures [s], rising, of a roadmap of several.
+    `lo`, `hi` (3,) [m] are the box of nodes. `departure` [s] is the time at which a glider leaves a node.
+    `to_lonlat` changes x, y [m] into degrees in a geographic scenario. `departs` is the date and time of the
+    departure (UTC), if known. `frozen`: in queries every leg meets the current of the departure, though the flow
+    changes. `bins` [s]: queries keep ways to one node that arrive in different bins of time. `flow_words` and
+    `glider_words` describe flow and glider. `domain` is the scenario's domain. `slices` are the rising departures
+    [s] of a roadmap of several departures.
 
     Examples:
         >>> problem = glider_stream.read_scenario("small.toml").problem()
@@ -52,16 +53,16 @@ class Problem:
 
     @property
     def departures(self) -> tuple[float, ...]:
-        """Of all slices of the roadmap [s]: its one departure where the scenario has no [departures]."""
+        """The departures [s] of all slices of the roadmap; only one if the scenario has no [departures]."""
         return self.slices or (self.departure,)
 
     def leaving(self, since: float) -> "Problem":
-        """The same problem for gliders that leave `since` [s] later."""
+        """Return the same problem for gliders that leave `since` [s] later."""
         departs = None if self.departs is None else self.departs + timedelta(seconds=since)
         return replace(self, departure=self.departure + since, departs=departs)
 
     def check_point(self, point: Array, name: str) -> None:
-        """InputError unless a glider can be at `point` (3,) [m]."""
+        """Raise InputError unless a glider can be at `point` (3,) [m]."""
         shown, deepest = [*point], f"domain, which ends at z = {self.lo[2]:g} m"
         if self.to_lonlat is not None and np.isfinite(point).all():
             shown = [*self.to_lonlat(point[None])[0], 0.0 - point[2]]
@@ -79,6 +80,6 @@ class Problem:
         require(False, f"`{name}` = {text} lies {where}; move it into open water")
 
     def legs(self, position: Array) -> Legs:
-        """How legs among these nodes (n, 3) [m] are found."""
+        """Return the object that finds legs among nodes (n, 3) [m]."""
         volume = float(np.prod(self.hi - self.lo))
         return legs_of(self.law, self.evaluator, position, volume, self.departure)

@@ -1,4 +1,4 @@
-"""What made a roadmap, and whether that is still what is at hand."""
+"""What made a roadmap, and a check that flow, terrain and glider are still the same."""
 
 import hashlib
 import platform
@@ -21,16 +21,16 @@ from .roadmap import Provenance, Roadmap
 from .slices import SlicedRoadmap
 
 _version = cache(version)
-"""Versions of packages, which are read from files."""
+"""Returns the version of a package; it is cached, because it is read from files."""
 
 
 def lonlat_of(problem: Problem, position: Array) -> Array | None:
-    """Longitude and latitude [degrees] of nodes (n, 3) [m], where the scenario is geographic."""
+    """Return longitude and latitude (n, 2) [degrees] of nodes (n, 3) [m]; None if not geographic."""
     return None if problem.to_lonlat is None else problem.to_lonlat(position)
 
 
 def provenance_of(problem: Problem, position: Array, folder: Path | None = None) -> Provenance:
-    """What a roadmap of this problem, with nodes (n, 3) [m], in a file in `folder`, is made by, now."""
+    """Return what makes a roadmap of this problem now, with nodes (n, 3) [m] and a file in `folder`."""
     names = names_of(tomllib.loads(problem.scenario))
     return Provenance(
         scenario=problem.scenario,
@@ -53,7 +53,7 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
 
 
 def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
-    """InputError unless flow, terrain and glider are those that the roadmap was built with."""
+    """Raise InputError unless the roadmap was built with the problem's flow, terrain and glider."""
     made = roadmap.provenance
     for name, digest, now in (
         ("flow", made.flow_sha256, flow_sha256(problem.evaluator.flow)),
@@ -61,7 +61,7 @@ def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
         ("glider", made.glider_sha256, glider_sha256(problem.evaluator.polar)),
     ):
         require(
-            digest in ("", now),  # earlier versions of the program did not say the terrain's
+            digest in ("", now),  # earlier versions of the program did not store the terrain's digest
             f"the {name} has changed since the roadmap was built (its digest was {digest[:12]}, it is "
             f"{now[:12]} now); build the roadmap again",
         )

@@ -1,4 +1,4 @@
-"""The roadmap: nodes, the legs between them, and how it is built."""
+"""The roadmap: nodes, the legs between them, and what made it."""
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
 
 @dataclass(frozen=True)
 class Provenance:
-    """What made a roadmap; what a file of an earlier version of the program does not say is empty."""
+    """What made a roadmap; a value that a file of an earlier version does not hold is empty."""
 
     scenario: str
     flow: str
@@ -39,7 +39,7 @@ class Provenance:
     steps: str = ""
 
     def identity(self) -> dict[str, str]:
-        """What two roadmaps, or parts of one, must share to hold the same edges: content, and no file's name."""
+        """Return the values that two roadmaps, or two parts, must share to have the same edges; no file names."""
         keys = (
             "nodes_sha256",
             "flow_sha256",
@@ -52,10 +52,11 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Edges:
-    """What was found from some nodes `source` (n,), rising: the `degree` of each (n,), the edges, the pairs.
+    """The edges from some nodes `source` (n,), whose numbers rise; `degree` (n,) is the number of edges of each.
 
-    `target` (edges,) rises within a node's; `values` (edges, 6) in the order of EDGE_FIELDS; `counts`
-    (n, statuses) pairs by Status; `seconds` that it took, compilation left out.
+    `target` (edges,) rises within the edges of a node. `values` (edges, 6) are in the order of EDGE_FIELDS.
+    `counts` (n, statuses) are the numbers of pairs by Status. `seconds` is the time that it took, without
+    compilation.
     """
 
     source: Index
@@ -67,17 +68,17 @@ class Edges:
 
     @property
     def pairs(self) -> int:
-        """How many pairs were looked at."""
+        """The number of pairs that were evaluated."""
         return int(self.counts.sum())
 
     def of(self, chosen: NDArray[np.bool_]) -> "Edges":
-        """Those of some of the nodes (n,)."""
+        """Return the edges of only the `chosen` nodes (n,)."""
         edges = np.repeat(chosen, self.degree)
         kept = self.source[chosen], self.degree[chosen], self.target[edges], self.values[edges]
         return Edges(*kept, self.counts[chosen])
 
     def before(self, node: int) -> tuple["Edges", "Edges"]:
-        """Those of the nodes before `node`, and those from it on, without a copy."""
+        """Return the edges of the nodes before `node`, and of `node` and those after it; nothing is copied."""
         row = int(np.searchsorted(self.source, node))
         edge = int(self.degree[:row].sum())
         parts = []
@@ -87,7 +88,7 @@ class Edges:
         return parts[0], parts[1]
 
     def digest(self) -> str:
-        """A digest of all that they say; "" where there is no node."""
+        """Return a digest of all values; "" if there is no node."""
         if self.source.size == 0:
             return ""
         text = hashlib.sha256()
@@ -98,15 +99,15 @@ class Edges:
 
 
 def by_node(parts: Iterable[Edges]) -> Iterator[Edges]:
-    """The edges of parts, which come by their first nodes, in the order of all nodes.
+    """Yield the edges of `parts` in the order of all nodes; the parts come in the order of their first nodes.
 
-    Parts may interleave, as a cluster finds them; no more than those that overlap are held.
+    Parts may overlap, for example if a cluster finds them. Only parts that overlap are kept in memory.
     """
     waiting: list[Edges] = []
     for part in parts:
         if part.source.size == 0:
             continue
-        split = [one.before(int(part.source[0])) for one in waiting]
+        split = [earlier.before(int(part.source[0])) for earlier in waiting]
         ready = [before for before, _ in split if before.source.size]
         if ready:
             yield in_order(ready)
@@ -116,9 +117,9 @@ def by_node(parts: Iterable[Edges]) -> Iterator[Edges]:
 
 
 def in_order(parts: Sequence[Edges]) -> Edges:
-    """The edges of several sets of nodes as one, by the nodes' numbers."""
-    none: list[NDArray[Any]] = [np.empty((0, *shape), kind) for shape, kind in EMPTY]
-    parts = [Edges(none[0], none[1], none[2], none[3], none[4]), *parts]
+    """Return the edges of several sets of nodes as one set, in the order of the nodes' numbers."""
+    empty: list[NDArray[Any]] = [np.empty((0, *shape), kind) for shape, kind in EMPTY]
+    parts = [Edges(empty[0], empty[1], empty[2], empty[3], empty[4]), *parts]
     source, degree = (np.concatenate([getattr(part, name) for part in parts]) for name in ("source", "degree"))
     nodes = np.argsort(source, kind="stable")
     edges = np.argsort(np.repeat(source, degree), kind="stable")
@@ -139,17 +140,18 @@ EMPTY = (
     ((len(EDGE_FIELDS),), np.float64),
     ((len(Status),), np.int32),
 )
-"""Shapes and types of the arrays of `Edges`."""
+"""The shapes and types of the arrays of `Edges` without any node."""
 
 
 @dataclass(frozen=True)
 class Roadmap:
     """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
 
-    `indptr` (n + 1,), `target` (edges,), rising within a row; per edge `time` [s], `cost`, `glide_angle`
-    (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts`: pairs by status;
-    `node_counts` (n, statuses) those of each node, where the file has them. `file`: where it was read from;
-    `elsewhere`: section.key=FILE for each file of its scenario that the user says is now there.
+    `indptr` (n + 1,) and `target` (edges,), which rises within a row. Each edge has `time` [s], `cost`,
+    `glide_angle` (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts` are the numbers
+    of pairs by status, and `node_counts` (n, statuses) those of each node, if the file has them. `file` is the
+    file from which it was read. `elsewhere` holds section.key=FILE for each file of the scenario for which the
+    user gave a new place.
 
     Examples:
         >>> roadmap = glider_stream.read_roadmap("small.h5")
@@ -180,21 +182,21 @@ class Roadmap:
 
     @property
     def evaluated(self) -> int:
-        """How many pairs were looked at."""
+        """The number of pairs that were evaluated."""
         return sum(self.counts.values())
 
     @property
     def connected_share(self) -> float:
-        """Edges found, as a share of the pairs looked at."""
+        """The number of edges as a share of the pairs that were evaluated."""
         return self.target.size / max(self.evaluated, 1)
 
     @property
     def pairs_per_s(self) -> float:
-        """Pairs evaluated per second of wall time, compilation left out."""
+        """The number of pairs evaluated per second of wall time, without compilation."""
         return self.evaluated / max(self.wall_s, 1e-9)
 
     def as_dict(self) -> dict[str, Any]:
-        """What `info --json` says."""
+        """Return the table that `info --json` prints."""
         return {
             "nodes": len(self.position),
             "edges": self.target.size,
@@ -218,5 +220,5 @@ class Roadmap:
             f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
             f"{self.provenance.created}\n"
             f"  by:     glider-stream {self.provenance.software_version}"
-            + "".join(f", {words}" for words in (self.provenance.libraries, self.provenance.machine) if words)
+            + "".join(f", {text}" for text in (self.provenance.libraries, self.provenance.machine) if text)
         )

@@ -15,15 +15,15 @@ class Shard:
 
     @property
     def whole(self) -> bool:
-        """Whether it is all there is."""
+        """Whether this part is the whole roadmap."""
         return self.count == 1
 
     def nodes(self, count: int) -> tuple[int, int]:
-        """The first source node, and that after the last, of `count` nodes."""
+        """Return the first source node of this part, and the node after its last one, of `count` nodes."""
         return (self.number - 1) * count // self.count, self.number * count // self.count
 
     def rows(self, count: int, slices: int) -> tuple[int, int]:
-        """As `nodes`, of the rows of edges that `count` nodes have: one for each departure."""
+        """Return the first row of edges, and the row after the last; each node has one row for each departure."""
         first, last = self.nodes(count)
         return first * slices, last * slices
 
@@ -33,7 +33,10 @@ class Shard:
 
 @dataclass(frozen=True)
 class Part:
-    """A shard out of its file; `edges` are None where only the head was read; `departures` of a sliced one."""
+    """A shard that was read from its file.
+
+    `edges` is None if only the head was read. `departures` (slices,) [s] is None for a roadmap of one departure.
+    """
 
     shard: Shard
     provenance: Provenance

@@ -13,16 +13,16 @@ from .roadmap import EDGE_FIELDS, Provenance, Roadmap
 
 
 def rows_of(nodes: Index, slices: int) -> Index:
-    """The rows of some nodes' edges: node n has the rows from n times `slices` on, one for each departure."""
+    """Return the rows of edges of some nodes: node n has `slices` rows from n times `slices` on."""
     return np.asarray((nodes[:, None] * slices + np.arange(slices)).ravel())
 
 
 @dataclass(frozen=True)
 class SlicedRoadmap:
-    """Nodes `position` (n, 3) [m]; edges at each of the `departures` (slices,) [s], rising.
+    """Nodes `position` (n, 3) [m], and edges at each of the rising `departures` (slices,) [s].
 
-    As `Roadmap`, but `indptr` (n slices + 1,) has a row for each node and departure, as `rows_of` numbers
-    them, and `row_counts` (n slices, statuses) are the pairs of each.
+    The fields are those of `Roadmap`. But `indptr` (n slices + 1,) has a row for each node and departure, in the
+    order of `rows_of`, and `row_counts` (n slices, statuses) are the numbers of pairs of each row.
 
     Examples:
         >>> departures = ["departures.first=0", "departures.last=600", "departures.every=600"]
@@ -52,11 +52,11 @@ class SlicedRoadmap:
 
     @property
     def evaluated(self) -> int:
-        """How many pairs were looked at."""
+        """The number of pairs that were evaluated."""
         return sum(self.counts.values())
 
     def at(self, number: int) -> Roadmap:
-        """One slice, as a roadmap of its own."""
+        """Return one slice as a roadmap."""
         slices, nodes = self.departures.size, len(self.position)
         require(0 <= number < slices, f"slices have the numbers 0 to {slices - 1}; got {number}")
         rows = np.arange(nodes) * slices + number
@@ -84,7 +84,7 @@ class SlicedRoadmap:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """What `info --json` says."""
+        """Return the table that `info --json` prints."""
         return {
             "nodes": len(self.position),
             "departures": self.departures.tolist(),
@@ -110,5 +110,5 @@ class SlicedRoadmap:
             f"  glider: {self.provenance.glider}\n"
             f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.provenance.created}\n"
             f"  by:     glider-stream {self.provenance.software_version}"
-            + "".join(f", {words}" for words in (self.provenance.libraries, self.provenance.machine) if words)
+            + "".join(f", {text}" for text in (self.provenance.libraries, self.provenance.machine) if text)
         )

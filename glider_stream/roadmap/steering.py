@@ -1,6 +1,6 @@
-"""How legs are looked for: steering methods and the integration, as a scenario has them.
+"""The settings of steering and integration in a scenario: they say how legs are found.
 
-A new method is one class like these and one row of METHODS: nothing else asks which method it has.
+A new method needs one class like these and one row of METHODS; no other code depends on the kind of method.
 """
 
 from collections.abc import Callable
@@ -12,16 +12,18 @@ from ..kernels import connect, control, motion, refine
 from ..kernels.fan import FlowMap
 
 Connector = Callable[..., None]
-"""A kernel that tries pairs one by one, as kernels/connect.py has it."""
+"""A kernel that tries pairs one by one, such as those of kernels/connect.py."""
 
 MAX_CANDIDATES = 1_000_000
+"""The greatest number of candidate controls of a pair."""
 
 MAX_FAN, MAX_GENERATIONS = 1000, 6
+"""The greatest number of angles and headings of a fan, and of generations in which its cells are halved."""
 
 
 @dataclass(frozen=True)
 class SurfaceMethod:
-    """The paper's baseline: controls over the whole control surface; `candidates` counts those integrated."""
+    """The paper's baseline: `candidates` controls over the whole control surface are integrated."""
 
     candidates: int
 
@@ -35,7 +37,7 @@ class SurfaceMethod:
         return kernel
 
     def kernel(self) -> control.Steering:
-        """As the kernels read it."""
+        """Return the same settings in the form that the kernels read."""
         return control.Surface(self.candidates)
 
 
@@ -43,7 +45,8 @@ class SurfaceMethod:
 class StreamlineMethod:
     """The paper's method: controls on the control line.
 
-    With `refine`, those that land nearest are first guesses of exact legs, polished as the flow map's are.
+    With `refine`, the controls that land nearest are first guesses, from which exact legs are found, as with the
+    flow map.
     """
 
     candidates: int
@@ -59,16 +62,17 @@ class StreamlineMethod:
         return kernel
 
     def kernel(self) -> control.Steering:
-        """As the kernels read it."""
+        """Return the same settings in the form that the kernels read."""
         return control.Streamline(self.candidates)
 
 
 @dataclass(frozen=True)
 class FlowMapMethod:
-    """Exact steering: every connection that there is, by the flow map of each source node.
+    """Exact steering: finds every connection that exists, by the flow map of each source node.
 
-    `fan` = [glide angles, headings] of the coarsest mesh over the controls of a node; its cells are halved
-    once, and up to `generations` times more where they are bent or folded, so that little depends on either.
+    `fan` = [glide angles, headings] is the coarsest mesh over the controls of a node. Its cells are halved once,
+    and up to `generations` times more where they are bent or folded, so the result depends little on both
+    settings.
     """
 
     fan: tuple[int, int] = (6, 12)
@@ -86,7 +90,7 @@ class FlowMapMethod:
         return None
 
     def kernel(self) -> FlowMap:
-        """As the kernels read it."""
+        """Return the same settings in the form that the kernels read."""
         return FlowMap(*self.fan, self.generations)
 
 
@@ -106,7 +110,7 @@ METHODS: dict[str, type[Method]] = {
 
 @dataclass(frozen=True)
 class IntegrationSettings:
-    """`steps` RK4 steps of `dt` [s] make the horizon; a miss below `tolerance` [m] is a hit."""
+    """The horizon has `steps` RK4 steps of `dt` [s]; a miss below `tolerance` [m] is a hit."""
 
     dt: float
     steps: int
@@ -122,5 +126,5 @@ class IntegrationSettings:
         require(fits, f"`integration.tolerance` must be {WIDEST:g} m at most; got {self.tolerance:g}")
 
     def kernel(self) -> motion.Integration:
-        """As the kernels read it."""
+        """Return the same settings in the form that the kernels read."""
         return motion.Integration(self.dt, self.steps, self.tolerance)

@@ -1,4 +1,4 @@
-"""How far off the integration's step puts legs: a sample of them, flown again in finer steps."""
+"""The error of the integration's step: a sample of legs is flown again in finer steps."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -13,21 +13,23 @@ from .problem import Problem
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
 
 SAMPLED_NODES, SAMPLED_LEGS = 16, 512
-"""The legs that are flown again: some of each of a few nodes, evenly chosen by their numbers."""
+"""At most this many nodes, evenly chosen by their numbers, and at most this many of their legs are flown
+again."""
 MOST_SAMPLED_NODES = 128
-"""Where few legs leave those nodes, up to so many are asked for theirs; more would cost each part much."""
+"""If few legs leave those nodes, the legs of up to this many nodes are found; more would take each part too
+long."""
 FINER = 0.381966
-"""The finer step, in steps: near a half, but no simple fraction. A flow that repeats itself every step, or every
-half one, would look the same in half steps."""
+"""The finer step as a share of the step: near a half, but not a simple fraction. A flow that repeats itself in
+every step, or in every half step, would give the same result in half steps."""
 
 
 UNTRIED = "not tried: no leg leaves any of the nodes that were asked"
-"""Words in a roadmap whose build had no leg to fly again."""
+"""This text stands in a roadmap whose build had no leg to fly again."""
 
 
 @dataclass(frozen=True)
 class StepError:
-    """Of `legs` legs, flown in steps of `dt` [s], the worst ends `off` [m] from where it does in finer steps."""
+    """The greatest distance `off` [m] between the ends of `legs` legs in steps of `dt` [s] and in finer steps."""
 
     off: float
     legs: int
@@ -35,7 +37,7 @@ class StepError:
     tolerance: float
 
     def check(self) -> None:
-        """InputError where it exceeds the tolerance."""
+        """Raise InputError if the error exceeds the tolerance."""
         worst = f"of {self.legs} legs, the worst ends {self.off:.3g} m off"
         cure = "make `integration.dt` smaller, and `integration.steps` larger by as much"
         require(
@@ -52,12 +54,12 @@ class StepError:
 
 
 def sampled_nodes(count: int, few: int = SAMPLED_NODES) -> Index:
-    """The nodes of so many whose legs are flown again: the same for all parts, and every run, of a build."""
+    """Return the nodes, of `count`, whose legs are flown again; they are the same for all parts of a build."""
     return np.unique(np.linspace(0, count - 1, few).astype(np.int64))
 
 
 def wider_samples(count: int) -> Iterator[Index]:
-    """Of so many nodes a few, then twice as many, until all or the most are sampled."""
+    """Yield samples of `count` nodes: a few, then twice as many, until all or the greatest number is sampled."""
     few = SAMPLED_NODES
     while few < min(count, MOST_SAMPLED_NODES):
         yield sampled_nodes(count, few)
@@ -66,7 +68,7 @@ def wider_samples(count: int) -> Iterator[Index]:
 
 
 def step_error(problem: Problem, start: Array, values: Array) -> StepError:
-    """How far off some of the legs from `start` (n, 3) [m] end; their `values` (n, 6) as EDGE_FIELDS says."""
+    """Return the step error of some legs from `start` (n, 3) [m]; `values` (n, 6) in the order of EDGE_FIELDS."""
     evaluator = problem.evaluator
     integration = evaluator.integration
     finer = replace(evaluator, integration=replace(integration, dt=FINER * integration.dt))
@@ -74,21 +76,21 @@ def step_error(problem: Problem, start: Array, values: Array) -> StepError:
     off = 0.0
     for n in some:
         leg = Edge(CONNECTED, *(float(value) for value in values[n]))
-        ends = [one.trace(start[n], leg, problem.departure)[-1, 1:] for one in (evaluator, finer)]
+        ends = [each.trace(start[n], leg, problem.departure)[-1, 1:] for each in (evaluator, finer)]
         off = max(off, float(np.linalg.norm(ends[0] - ends[1])))
     return StepError(off, len(some), integration.dt, integration.tolerance)
 
 
 class StepSample:
-    """The legs of a few nodes of a build: those that are known already, the others found."""
+    """The legs of a few nodes of a build; legs that are known already are not found again."""
 
     def __init__(self, count: int) -> None:
-        """Of a build of so many nodes."""
+        """Choose the sampled nodes of a build of `count` nodes."""
         self.samples = list(wider_samples(count))
         self.known = in_order([])
 
     def take(self, edges: Edges) -> None:
-        """Keep what an earlier run, or an older roadmap, of one departure, knows of nodes that may be sampled."""
+        """Keep the edges of sampled nodes from an earlier run, or from an older roadmap, of one departure."""
         wanted = np.unique(np.concatenate(self.samples))
         self.known = in_order([self.known, edges.of(np.isin(edges.source, wanted))])
 
@@ -99,24 +101,24 @@ class StepSample:
         position: Array,
         find: Callable[[Problem, Index], Iterable[Edges]],
     ) -> Provenance:
-        """What makes a roadmap, with words on its steps; InputError where they are too coarse.
+        """Return the provenance with a text on its steps; InputError if the steps are too coarse.
 
         `find` evaluates some of the nodes `position` (n, 3) [m] at the departure of a problem. Of many departures
-        the first, the last and the one in the middle are looked at, anew each time.
+        the first, the last and the middle one are checked, each with new legs.
         """
         times = problem.departures
         errors = []
         for when in sorted({times[0], times[len(times) // 2], times[-1]}):
-            one = replace(problem, departure=when, slices=())
-            edges = self._legs(partial(find, one))
-            errors.append(step_error(one, position[np.repeat(edges.source, edges.degree)], edges.values))
+            at_departure = replace(problem, departure=when, slices=())
+            edges = self._legs(partial(find, at_departure))
+            errors.append(step_error(at_departure, position[np.repeat(edges.source, edges.degree)], edges.values))
         worst = max(errors, key=lambda error: error.off)
         worst = replace(worst, legs=sum(error.legs for error in errors))
         worst.check()
         return replace(made, steps=str(worst))
 
     def _legs(self, find: Callable[[Index], Iterable[Edges]]) -> Edges:
-        """The legs of the first sample that has enough of them, or of the widest."""
+        """Return the legs of the first sample that has enough legs, or of the largest sample."""
         known = self.known
         for nodes in self.samples:
             missing = np.setdiff1d(nodes, known.source)
@@ -129,7 +131,7 @@ class StepSample:
 
 
 def check_steps(roadmap: Roadmap, problem: Problem) -> None:
-    """InputError where the steps of a roadmap are too coarse for its flow; if its build did not look already."""
+    """Raise InputError if the steps of a roadmap are too coarse, unless its build has checked them."""
     if roadmap.provenance.steps and UNTRIED not in roadmap.provenance.steps:
         return
     degree = np.diff(roadmap.indptr)

@@ -1,4 +1,4 @@
-"""The roadmap file: HDF5, format versions 1 and 2, of many departures. Nothing else knows h5py."""
+"""The roadmap file: HDF5, format versions 1 and 2 (many departures). Only this module uses h5py for it."""
 
 import contextlib
 import hashlib
@@ -28,11 +28,11 @@ AnyArray = NDArray[Any]
 FORMAT = "glider-stream/roadmap"
 PART_FORMAT = "glider-stream/roadmap-part"
 VERSION, SLICED_VERSION = 1, 2
-"""A roadmap of one departure, and of several; see docs/roadmap-format.md."""
+"""The format versions of a roadmap of one departure, and of several; see docs/roadmap-format.md."""
 CHUNK = 32768
-"""Edges in a chunk of a dataset, 256 kB: one is checked and cached whole."""
+"""A chunk of a dataset has this many edges, 256 kB; HDF5 checks and caches whole chunks."""
 CHECKED = 16 * CHUNK
-"""Rows that are read back at once when a file is checked."""
+"""When a file is checked, this many rows are read back at a time."""
 
 _DESCRIBED = {
     "nodes/position": ("f8", "m", "node position: x east, y north, z upward from the surface"),
@@ -53,15 +53,15 @@ _SLICES = "slices/departure"
 
 
 class Guarded(io.FileIO):
-    """A file for HDF5 that takes whatever is written: HDF5 can close no file on a full disk.
+    """A file for HDF5 in which writing never fails, because HDF5 cannot close a file on a full disk.
 
-    What went wrong first is kept in `error`, to be raised when HDF5 does not look.
+    The first error is kept in `error`; `check` raises it later, outside of HDF5.
     """
 
     error: OSError | None = None
 
     def write(self, part: Any) -> int:
-        """Write all of `part`, or pretend to."""
+        """Write all of `part`; after an error nothing is written, but the full size is returned."""
         whole = memoryview(part).nbytes
         done = 0
         while self.error is None and done < whole:
@@ -72,10 +72,10 @@ class Guarded(io.FileIO):
         return whole
 
     def flush(self) -> None:
-        """HDF5 asks for it; a file without a buffer has nothing to do."""
+        """Do nothing: HDF5 calls this, but the file has no buffer."""
 
     def check(self) -> None:
-        """Raise what went wrong."""
+        """Raise the first error, if there was one."""
         if self.error is not None:
             raise self.error
 
@@ -93,7 +93,7 @@ class RoadmapWriter:
         shard: Shard,
         departures: AnyArray | None,
     ) -> None:
-        """Write what is known before the edges are."""
+        """Write everything that is known before the edges."""
         self._disk, self._file = disk, file
         self._unit = made.cost_unit
         self._waiting: list[Edges] = []
@@ -115,7 +115,7 @@ class RoadmapWriter:
             self._put(_SLICES, departures)
 
     def append(self, edges: Edges) -> None:
-        """Take the edges of the next rows, node by node; RuntimeError if they are others, as only a bug gives."""
+        """Take the edges of the next rows, node by node; RuntimeError if they are other rows, which is a bug."""
         follows = np.array_equal(edges.source, np.arange(self._next, self._next + edges.source.size))
         whole = edges.degree.sum() == edges.target.size == len(edges.values)
         if not follows or not whole:
@@ -126,11 +126,11 @@ class RoadmapWriter:
         self._degree.append(edges.degree)
         self._counts.append(edges.counts)
         self._waiting.append(edges)
-        if sum(one.target.size for one in self._waiting) >= CHUNK:
+        if sum(edges.target.size for edges in self._waiting) >= CHUNK:
             self._flush()
 
     def finish(self, tally: Tally) -> None:
-        """Write what is known after the edges are, and declare the file complete."""
+        """Write everything that is known after the edges, and mark the file as complete."""
         self._flush()
         if self._next != self._last:
             raise RuntimeError(f"the edges of node {self._next:,} are missing; no file is made")
@@ -149,8 +149,8 @@ class RoadmapWriter:
 
     def _flush(self) -> None:
         waiting, self._waiting = self._waiting, []
-        values = np.concatenate([np.empty((0, len(EDGE_FIELDS))), *(one.values for one in waiting)])
-        self._put("edges/target", np.concatenate([np.empty(0, np.int32), *(one.target for one in waiting)]))
+        values = np.concatenate([np.empty((0, len(EDGE_FIELDS))), *(edges.values for edges in waiting)])
+        self._put("edges/target", np.concatenate([np.empty(0, np.int32), *(edges.target for edges in waiting)]))
         for n, name in enumerate(EDGE_FIELDS):
             self._put(f"edges/{name}", values[:, n])
         self._file["edges/cost"].attrs["units"] = self._unit
@@ -158,8 +158,8 @@ class RoadmapWriter:
         self._disk.check()
 
     def _put(self, name: str, rows: AnyArray) -> None:
-        """Append rows to a dataset, which is made if there is none."""
-        kind, unit, words = _DESCRIBED[name]
+        """Append rows to a dataset; the dataset is made if it does not exist."""
+        kind, unit, description = _DESCRIBED[name]
         rows = np.ascontiguousarray(rows, kind)
         self.digests.setdefault(name, hashlib.blake2b()).update(rows.tobytes())
         if name in self._file:
@@ -168,12 +168,12 @@ class RoadmapWriter:
             dataset.resize(before + len(rows), axis=0)
             dataset[before:] = rows
             return
-        # checksums need chunks, and chunks an element
+        # checksums need chunks, and a chunk has at least one element
         chunks = (max(1, min(CHUNK, len(rows))), *rows.shape[1:])
         more = {"maxshape": (None, *rows.shape[1:]), "chunks": chunks, "fletcher32": True}
         dataset = self._file.create_dataset(name, data=rows, **more)
         dataset.attrs["units"] = unit
-        dataset.attrs["long_name"] = words
+        dataset.attrs["long_name"] = description
 
 
 @contextlib.contextmanager
@@ -185,9 +185,9 @@ def writing(
     shard: Shard,
     departures: AnyArray | None = None,
 ) -> Iterator[RoadmapWriter]:
-    """A roadmap file in the making; at `path` when the block ends well, and not at all else.
+    """Yield the writer of a roadmap file; the file appears at `path` only if the block ends well.
 
-    `departures` (slices,) [s] make a file of several slices.
+    With `departures` (slices,) [s] the file has several slices.
     """
     with replacing(Path(path)) as temporary, Guarded(temporary, "w+") as disk:
         with h5py.File(disk, "w") as file:
@@ -198,7 +198,7 @@ def writing(
 
 
 def _check_written(temporary: Path, path: Path, digests: dict[str, Any]) -> None:
-    """Unwritable unless a finished file reads back as it was written, to the bit: before it replaces anything."""
+    """Raise Unwritable unless a finished file reads back bit by bit as written; no file is replaced before."""
     with h5py.File(temporary, "r") as file:
         for name, digest in digests.items():
             dataset, read = file[name], hashlib.blake2b()
@@ -209,7 +209,7 @@ def _check_written(temporary: Path, path: Path, digests: dict[str, Any]) -> None
 
 
 def write_roadmap(roadmap: Roadmap | SlicedRoadmap, path: str | Path) -> None:
-    """Write a roadmap file; an existing one is replaced at once, by a complete one, or not at all.
+    """Write a roadmap file; an existing file is replaced by the complete new one, or stays as it is.
 
     Examples:
         >>> roadmap = glider_stream.read_roadmap("small.h5")
@@ -232,7 +232,7 @@ def write_roadmap(roadmap: Roadmap | SlicedRoadmap, path: str | Path) -> None:
 
 
 def read_roadmap(path: str | Path) -> Roadmap:
-    """Read the file of a roadmap of one departure; InputError where it is none, newer, incomplete or damaged.
+    """Read the file of a roadmap of one departure; InputError if it is another file, newer or damaged.
 
     Examples:
         >>> glider_stream.read_roadmap("small.h5").target.size
@@ -249,7 +249,7 @@ def read_roadmap(path: str | Path) -> Roadmap:
 
 
 def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
-    """Read a roadmap file, of one departure or of several; InputError where it is none, or damaged."""
+    """Read a roadmap file of one departure or of several; InputError if it is another file or damaged."""
     path = Path(path)
     with _reading(path) as file:
         _check_head(file, path, FORMAT)
@@ -278,16 +278,16 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
         if departures is None:
             return Roadmap(**whole, node_counts=by_row)
         return SlicedRoadmap(departures, **whole, row_counts=by_row)
-    raise AssertionError  # _reading raises
+    raise AssertionError  # never reached, because _reading raises
 
 
 def _names() -> list[str]:
-    """The datasets that every version has."""
+    """Return the names of the datasets that every version may have."""
     return [name for name in _DESCRIBED if name != _SLICES]
 
 
 def _departures(file: h5py.File, path: Path) -> AnyArray | None:
-    """The departures [s] of a file of several; None where it is of one."""
+    """Return the departures (slices,) [s] of a file; None if the file has only one departure."""
     if int(file.attrs["format_version"]) == VERSION:
         return None
     times = _arrays(file, path, [_SLICES])[_SLICES]
@@ -297,7 +297,7 @@ def _departures(file: h5py.File, path: Path) -> AnyArray | None:
 
 
 def read_part(path: str | Path, edges: bool = True) -> Part:
-    """Read a shard's file, or with `edges` false its head alone; InputError where it is none, or damaged."""
+    """Read a shard's file, only its head if `edges` is False; InputError if it is another file or damaged."""
     path = Path(path)
     with _reading(path) as file:
         _check_head(file, path, PART_FORMAT)
@@ -327,7 +327,7 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
-    """An open file of ours; whatever its damage makes h5py raise is an InputError."""
+    """Yield an open roadmap file; every error that h5py raises on a damaged file becomes an InputError."""
     require(path.exists(), f"the roadmap {path} does not exist; build it first")
     check_file(path, "the roadmap")
     try:
@@ -346,13 +346,13 @@ def _reading(path: Path) -> Iterator[h5py.File]:
 
 
 def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
-    said = file.attrs.get("format")
-    if said == PART_FORMAT and wanted == FORMAT:
+    found = file.attrs.get("format")
+    if found == PART_FORMAT and wanted == FORMAT:
         shard = str(file.attrs.get("shard"))
         raise InputError(f"{path} is part {shard} of a roadmap; make it whole with `glider-stream merge`")
-    what, command = "none" if said is None else repr(said), "build" if wanted == FORMAT else "build --shard"
+    what, command = "none" if found is None else repr(found), "build" if wanted == FORMAT else "build --shard"
     noun = "a roadmap" if wanted == FORMAT else "a part of a roadmap"
-    require(said == wanted, f"{path} is not {noun}, its format is {what}; give a file that `{command}` wrote")
+    require(found == wanted, f"{path} is not {noun}, its format is {what}; give a file that `{command}` wrote")
     version = int(file.attrs["format_version"])
     require(
         version in (VERSION, SLICED_VERSION),
@@ -366,7 +366,7 @@ def _check_head(file: h5py.File, path: Path, wanted: str) -> None:
 
 
 def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray]:
-    """The datasets by name, of the kind that they should be and no larger than the file can hold."""
+    """Return the datasets by name, after checks of their types and of their sizes against the file's size."""
     arrays: dict[str, AnyArray] = {}
     for name in names:
         kind = _DESCRIBED[name][0]
@@ -375,8 +375,8 @@ def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray
         require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
         dataset = file[name]
         fits = isinstance(dataset, h5py.Dataset) and dataset.dtype.kind == np.dtype(kind).kind
-        said = getattr(dataset, "dtype", "a group")
-        require(fits, f"the roadmap {path} is damaged: {name} is {said}, not {kind}; build it again")
+        found = getattr(dataset, "dtype", "a group")
+        require(fits, f"the roadmap {path} is damaged: {name} is {found}, not {kind}; build it again")
         check_claim(path, name, dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
         stored = np.asarray(dataset[()])
         arrays[name] = stored.astype(kind, copy=False)
@@ -386,7 +386,7 @@ def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray
 
 
 def _check_edges(arrays: dict[str, AnyArray], rows: int, path: Path) -> None:
-    """InputError unless the datasets fit each other: edges of so many rows among the nodes."""
+    """Raise InputError unless the datasets fit each other and hold edges of `rows` rows among the nodes."""
     position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]
     lonlat, counts = arrays.get("nodes/lonlat"), arrays.get("pairs/by_node")
     nodes, edges = len(position), target.size
@@ -412,7 +412,7 @@ def _check_edges(arrays: dict[str, AnyArray], rows: int, path: Path) -> None:
 
 
 def _effort(file: h5py.File, path: Path) -> tuple[float, int]:
-    """Seconds and threads of a build."""
+    """Return the wall time [s] and the number of threads of a build."""
     pairs = file["pairs"].attrs
     wall, used = float(pairs["wall_s"]), int(pairs["threads"])
     require(0 <= wall < np.inf, f"the roadmap {path} is damaged: its wall time makes no sense; build it again")
@@ -420,11 +420,12 @@ def _effort(file: h5py.File, path: Path) -> tuple[float, int]:
 
 
 def _provenance(file: h5py.File) -> Provenance:
-    said = file.attrs
-    words = {
-        f.name: said[f.name] if f.default is MISSING else said.get(f.name, f.default) for f in fields(Provenance)
+    attributes = file.attrs
+    values = {
+        f.name: attributes[f.name] if f.default is MISSING else attributes.get(f.name, f.default)
+        for f in fields(Provenance)
     }
-    seed = int(words.pop("seed"))
-    # all but these are one line each, which is printed
-    texts = {n: str(v) if n in ("scenario", "inputs") else plain(str(v)) for n, v in words.items()}
+    seed = int(values.pop("seed"))
+    # all values except these two are single lines that are printed
+    texts = {n: str(v) if n in ("scenario", "inputs") else plain(str(v)) for n, v in values.items()}
     return Provenance(seed=seed, **texts)

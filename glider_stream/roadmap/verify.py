@@ -1,4 +1,4 @@
-"""Verification: is a roadmap what it says; its legs flown again, by its own integrator and by another."""
+"""Verification: checks a roadmap; its legs are flown again, by its own integrator and by another one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -28,22 +28,26 @@ from .slices import SlicedRoadmap
 from .store import read_any_roadmap
 
 LEGS_AT_ONCE = 10
-"""Legs that DOP853 flies together: its step is the one that the most crooked of them needs."""
+"""DOP853 flies this many legs together; its step must be small enough for the most curved of them."""
 EDGES_AT_ONCE = 4096
+"""A thread flies this many edges at a time."""
 SAME = 0.3
-"""The same integrator must find the same miss, to this [m]: a closest approach lies on a step's chord, and the
-arc of a step of 13 m that turns by 0.15 rad leaves its chord by 0.24 m."""
+"""The same integrator must find the same miss within this distance [m]. A closest approach is measured on the
+chord of a step, and the arc of a step of 13 m that turns by 0.15 rad is up to 0.24 m away from its chord."""
 MOST_OFF = 0.1
-"""By how much DOP853's miss may differ, in tolerances of the scenario: RK4 steps over the kinks of a grid."""
+"""The miss of DOP853 may differ by this share of the scenario's tolerance, because RK4 steps over the kinks of a
+grid."""
 WORST = 5
+"""This many of the worst edges are shown."""
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What was looked at: `edges` flown again as they were found, `sample` of them by DOP853; `faults`, if any.
+    """The result of a verification: `edges` were flown again, `sample` of them also by DOP853.
 
-    `differences` (sample,) [m]: between the replay's miss and the one that the roadmap says; `worst` edges.
+    `faults` are sentences; the tuple is empty if nothing is wrong. `differences` (sample,) [m] lie between
+    DOP853's miss and the roadmap's. `worst` holds the worst edges: source, target, difference [m].
     """
 
     file: str
@@ -65,7 +69,7 @@ class Verification:
         return {f"{share:.0%}": float(value) for share, value in zip(QUANTILES, values, strict=True)}
 
     def as_dict(self) -> dict[str, Any]:
-        """What `verify --json` says."""
+        """Return the table that `verify --json` prints."""
         return {
             "file": self.file,
             "holds": self.holds,
@@ -92,9 +96,10 @@ class Verification:
 def replayed_misses(
     evaluator: Evaluator, departure: float, position: Array, source: Index, target: Index, values: Array
 ) -> Array:
-    """How far from their targets [m] legs end, flown by scipy's DOP853 in the full flow: (n,).
+    """Return the distances (n,) [m] from their targets at which legs end when scipy's DOP853 flies them.
 
-    Legs from `source` to `target`, nodes of `position` (m, 3) [m]; `values` (n, 6) in the order of EDGE_FIELDS.
+    The legs lead from `source` (n,) to `target` (n,), which are nodes of `position` (m, 3) [m]; `values` (n, 6)
+    are in the order of EDGE_FIELDS.
     """
     column = {name: n for n, name in enumerate(EDGE_FIELDS)}
 
@@ -121,9 +126,9 @@ def replayed_misses(
 
 @entry_point(nogil=True)
 def _fly(medium, position, departure, source, target, edges, off, first, last):  # type: ignore[no-untyped-def]
-    """Distance [m] from their targets at which legs end, and what their speed is off by [m/s]: off (n, 2).
+    """Write to `off` (n, 2) the distance [m] of legs' ends from their targets, and their error of speed [m/s].
 
-    `edges` (n, EDGE_COLUMNS), from node `source` (n,) to node `target` (n,).
+    `edges` (n, EDGE_COLUMNS) lead from node `source` (n,) to node `target` (n,).
     """
     dt = medium.integration.dt
     latest = dt * (medium.integration.steps + 1)
@@ -131,7 +136,7 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
         time, angle, speed = edges[e, TIME], edges[e, GLIDE_ANGLE], edges[e, SPEED]
         off[e] = np.inf
         if not time <= latest:
-            continue  # a damaged file may say anything
+            continue  # a damaged file may hold any value
         c = control_of(speed, angle, edges[e, HEADING])
         x, y, z = position[source[e]]
         full = int(time / dt)
@@ -146,10 +151,10 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
 def verify(
     file: str | Path, problem_of: Callable[[Roadmap | SlicedRoadmap], Problem], sample: int = 200
 ) -> Verification:
-    """Look at a roadmap file: whole, made by the flow and glider that its scenario names, its legs as they say.
+    """Check that a roadmap file is whole, that its flow and glider are unchanged, and that its legs are right.
 
-    `problem_of` makes the problem of a roadmap. All edges are flown again as they were found, a
-    `sample` of them, all where it is 0, by DOP853 too.
+    `problem_of` makes the problem of a roadmap. All edges are flown again by the roadmap's integrator. A `sample`
+    of them, all if it is 0, is also flown by DOP853.
     """
     require(sample >= 0, f"`sample` must be at least 0, all; got {sample}")
     require(Path(file).is_file(), f"the roadmap {file} does not exist; build it first")
@@ -165,7 +170,7 @@ def verify(
 
 
 def check_slices(name: str, road: SlicedRoadmap, problem: Problem, sample: int) -> Verification:
-    """What `verify` says of a roadmap of several departures: of each slice, with a part of the sample."""
+    """Return the verification of a roadmap of several departures; each slice gets a part of the sample."""
     slices = road.departures.size
     parts = []
     for number, departure in enumerate(road.departures):
@@ -176,7 +181,7 @@ def check_slices(name: str, road: SlicedRoadmap, problem: Problem, sample: int) 
         for departure, part in zip(road.departures, parts, strict=True)
         for fault in part.faults
     ]
-    worst = sorted((one for part in parts for one in part.worst), key=lambda one: -one[2])[:WORST]
+    worst = sorted((edge for part in parts for edge in part.worst), key=lambda edge: -edge[2])[:WORST]
     return Verification(
         name,
         sum(part.edges for part in parts),
@@ -188,7 +193,7 @@ def check_slices(name: str, road: SlicedRoadmap, problem: Problem, sample: int) 
 
 
 def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Verification:
-    """What `verify` says of a roadmap that could be read."""
+    """Return the verification of a roadmap that was read without error."""
     evaluator, position = problem.evaluator, np.require(road.position, np.float64, ["C", "W"])
     source = np.repeat(np.arange(len(position)), np.diff(road.indptr))
     target = road.target.astype(np.int64)

@@ -290,7 +290,7 @@ def hops_of(path: Path) -> list[Hop]:
 
 
 def load_path(file: str | File) -> Path:
-    """Read a path file (JSON) that `query` wrote; InputError where it is not one, or holds no leg."""
+    """Read a path file (JSON) that `query` wrote; InputError if it is another file or holds no leg."""
     try:
         size = File(file).stat().st_size
         require(size <= MOST_TEXT, f"it holds {size:,} bytes, more than a path needs ({MOST_TEXT:,})")
