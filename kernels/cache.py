@@ -28,7 +28,7 @@ KERNEL_DIGEST = _digest()
 
 
 def _usable(folder: Path) -> bool:
-    """Whether compiled code can be kept in a folder, and nobody else can have put any there."""
+    """Return whether compiled code can be kept in a folder, and no other user can have put code there."""
     try:
         # Python's own folder is read by all users; ours is not
         private = 0o777 if folder.parent.name == "__pycache__" else 0o700
@@ -43,9 +43,9 @@ def _usable(folder: Path) -> bool:
 
 
 def trusted(folder: Path) -> bool:
-    """Whether a folder is ours, and no other user can write there or put another folder in its place.
+    """Return whether a folder is ours, and no other user can write there or replace it by another folder.
 
-    What is loaded from it runs with our rights. Windows keeps users apart by other means.
+    Code that is loaded from it runs with our rights. Windows separates users by other means.
     """
     if os.name == "nt":
         return True
@@ -58,11 +58,11 @@ def trusted(folder: Path) -> bool:
 
 
 def _places() -> Iterator[Path]:
-    """Folders for compiled kernels, the best first."""
+    """Yield folders for compiled kernels, the best first."""
     if config.CACHE_DIR:
         yield Path(config.CACHE_DIR)
     yield Path(__file__).parent / "__pycache__"
-    # an account without a home, as in a container, has no answer
+    # an account without a home folder, for example in a container, raises an error here
     with contextlib.suppress(RuntimeError):
         yield Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "glider-stream"
     with contextlib.suppress(OSError):
@@ -71,7 +71,7 @@ def _places() -> Iterator[Path]:
 
 
 def cache_folder() -> Path | None:
-    """Where compiled kernels of this digest are kept; None where no place can be written and trusted."""
+    """Return the folder for compiled kernels of this digest; None if no folder can be written and trusted."""
     return next((place / KERNEL_DIGEST[:16] for place in _places() if _usable(place / KERNEL_DIGEST[:16])), None)
 
 
@@ -84,7 +84,7 @@ instructions that make the threads wait for each other: without them a look at a
 making = njit(**ARITHMETIC | {"_nrt": True})
 """Compiles a kernel that makes an array."""
 kernel = njit(**BARE)
-"""Compiles a kernel that makes none, nor takes one that a callee has made."""
+"""Compiles a kernel that makes no array and takes no array that another kernel has made."""
 inlined = njit(**BARE | {"inline": "always"})
 """Put in the place of its call, whatever it makes. A large kernel that is called once compiles sooner so: LLVM
 meets its instructions once, and not again in every caller up to the entry point."""

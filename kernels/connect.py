@@ -1,4 +1,4 @@
-"""Connecting pairs by candidate controls, the paper's methods: flown together, each to its closest approach."""
+"""Connects pairs by candidate controls (the paper's methods); each control is flown to its closest approach."""
 
 import math
 from typing import NamedTuple
@@ -56,20 +56,22 @@ from .place import Pair, Place
 
 _ROWS = range(FLIGHT_ROWS, FLIGHT_ROWS + 14)
 TRY_PAIR, TRY_CONTROL, TRY_GLIDE_ANGLE, TRY_HEADING, TRY_SPEED = _ROWS[:5]
-"""Rows of a lane beyond `flight`'s: its pair, its control's number, and that control."""
+"""Rows of a lane after those of `flight`: its pair, the number of its control, and that control."""
 TRY_STEP, TRY_STRIDE, TRY_OPENS, TRY_CLOSES = _ROWS[5:9]
-"""Steps done; steps from the last look to the next; the steps at which the arrival window opens and closes."""
+"""Steps done; steps between the last check and the next; the steps at which the arrival window opens and
+closes."""
 TRY_MISS, TRY_DURATION, TRY_SLACK = _ROWS[9:12]
-"""Closest approach so far [m], and when [s]; what the control and the tolerance add to the flow's carry [m]."""
+"""Closest approach so far [m], its time [s], and the distance [m] that control and tolerance add to the
+flow's."""
 TRY_BEFORE_X, TRY_BEFORE_Y = _ROWS[12:]
-"""Where the lane was a stride ago [m]."""
+"""The place of the lane at the last check [m]."""
 TRY_ROWS = _ROWS.stop
 LOOK_EVERY = 12
-"""Steps between looks at a path that is not yet in its arrival window."""
+"""A path that is not yet in its arrival window is checked after this many steps."""
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes that are asked for, CSR by source.
+    """Pairs of nodes to evaluate, in CSR form by source.
 
     `position` (nodes, 3) [m], `departure` (nodes,) [s]; from `source` (n,) to `target[indptr[n]:indptr[n + 1]]`.
     """
@@ -83,7 +85,7 @@ class Pairs(NamedTuple):
 
 @kernel
 def pair_at(pairs, n, k):
-    """The ends of the pair target[k] of source[n]."""
+    """Return the two ends of the pair from source[n] to target[k]."""
     p = pairs.source[n]
     x, y, z = pairs.position[p]
     x_q, y_q, z_q = pairs.position[pairs.target[k]]
@@ -108,7 +110,7 @@ AT_SOURCE, AT_TARGET, AT_NEXT, AT_COUNT = range(4)
 
 @kernel
 def begin_pair(medium, steering, pair, controls, edge):
-    """Fill in a pair's candidate controls, and why there is no edge so far; returns how many there are."""
+    """Fill in a pair's candidate controls and the status without an edge; return the number of candidates."""
     integration = medium.integration
     status = quick_status(medium, pair)
     count = 0
@@ -122,7 +124,7 @@ def begin_pair(medium, steering, pair, controls, edge):
 
 @entry_point()
 def line_controls(medium, steering, pair):
-    """The candidate controls of one pair, for callers from Python: angle's magnitude and heading (n, 2) [rad]."""
+    """Return the candidate controls of one pair, for Python: magnitude of the angle and heading (n, 2) [rad]."""
     controls = np.empty((steering.candidates, 2))
     count = begin_pair(medium, steering, pair, controls, np.empty(EDGE_COLUMNS))
     return controls[:count]
@@ -130,7 +132,7 @@ def line_controls(medium, steering, pair):
 
 @kernel
 def _out_of_reach(medium, lanes, n):
-    """Whether the flow, at its fastest, can no longer carry lane n to its target in time."""
+    """Return whether even the fastest flow can no longer carry lane n to its target in time."""
     dt = medium.integration.dt
     start, goal = ends_of(lanes, n)
     left = (lanes[TRY_CLOSES, n] - lanes[TRY_STEP, n]) * dt
@@ -145,7 +147,7 @@ def _out_of_reach(medium, lanes, n):
 
 @kernel
 def _next_control(medium, steering, pairs, queue, edges):
-    """Let the queue stand at the next control, of the next pair where this one has no more; False at its end."""
+    """Move the queue to the next control, or to the next pair after the last control; False at the end."""
     at = queue.at
     while at[AT_NEXT] == at[AT_COUNT]:
         at[AT_TARGET] += 1
@@ -161,7 +163,7 @@ def _next_control(medium, steering, pairs, queue, edges):
 
 @kernel
 def _may_hit(medium, pair, c, lanes, n):
-    """Put lane n at the start of a control; whether it may come near its goal."""
+    """Put lane n at the start of a control; return whether it may come near its goal."""
     integration = medium.integration
     dt = integration.dt
     first, final = arrival_window(c.w, pair.goal.z - pair.start.z, integration.tolerance)
@@ -177,7 +179,7 @@ def _may_hit(medium, pair, c, lanes, n):
 
 @kernel
 def _launch(medium, steering, pairs, queue, edges, lanes, n):
-    """Send lane n off with the next control of the queue that may hit; False where there is none left."""
+    """Start lane n with the next control of the queue that may hit; False if no control is left."""
     at = queue.at
     while _next_control(medium, steering, pairs, queue, edges):
         k, number = at[AT_TARGET], at[AT_NEXT]
@@ -186,7 +188,7 @@ def _launch(medium, steering, pairs, queue, edges, lanes, n):
         angle, heading = queue.controls[number]
         c = control_towards(medium.polar, direction_of(pair), angle, heading)
         first, _ = arrival_window(c.w, pair.goal.z - pair.start.z, medium.integration.tolerance)
-        # controls come in order of arrival: from here on all are dearer
+        # controls come in order of arrival, so all later ones cost more
         if edges[k, STATUS] == CONNECTED and edge_cost(medium.cost, first) >= edges[k, COST]:
             at[AT_NEXT] = at[AT_COUNT]
             continue
@@ -201,13 +203,13 @@ def _launch(medium, steering, pairs, queue, edges, lanes, n):
 
 @inlined
 def _control_in(lanes, n):
-    """Lane n's control."""
+    """Return the control of lane n."""
     return control_of(lanes[TRY_SPEED, n], lanes[TRY_GLIDE_ANGLE, n], lanes[TRY_HEADING, n])
 
 
 @inlined
 def _fly_on(lanes, n):
-    """Let lane n fly until it is worth a look: step by step where it may arrive."""
+    """Let lane n fly until its next check; where it may arrive, it is checked after each step."""
     lanes[TRY_BEFORE_X, n], lanes[TRY_BEFORE_Y, n] = lanes[LANE_X, n], lanes[LANE_Y, n]
     stride = max(1.0, min(float(LOOK_EVERY), lanes[TRY_OPENS, n] - lanes[TRY_STEP, n]))
     lanes[TRY_STRIDE, n] = lanes[LANE_LEFT, n] = stride
@@ -215,7 +217,7 @@ def _fly_on(lanes, n):
 
 @kernel
 def _look(medium, lanes, n):
-    """Measure lane n's last steps against its target; whether its flight is over."""
+    """Measure the distance of lane n's last steps from its target; return whether its flight is over."""
     dt = medium.integration.dt
     pair = ends_of(lanes, n)
     start, goal = pair
@@ -223,7 +225,7 @@ def _look(medium, lanes, n):
     lanes[TRY_STEP, n] += lanes[TRY_STRIDE, n]
     step = lanes[TRY_STEP, n]
     if not stayed_inside(medium.flow, lanes, n, start.t, step * dt):
-        # a path that leaves the flow ends: step by step, where does it?
+        # a path ends where it leaves the flow; find that place step by step
         c = _control_in(lanes, n)
         lanes[TRY_MISS, n], lanes[TRY_DURATION, n] = closest_approach(medium.flow, pair, c, medium.integration)
         return True
@@ -245,10 +247,10 @@ def _look(medium, lanes, n):
 
 @kernel
 def _settle(medium, lanes, n, edge, chosen):
-    """Let lane n's closest approach be the edge, where it hits and is cheaper; returns the chosen control."""
+    """Make lane n's closest approach the edge if it hits and is cheaper; return the chosen control."""
     integration = medium.integration
     duration = lanes[TRY_DURATION, n]
-    # who is nearest when he leaves goes away from his goal: a leg takes time
+    # a glider that is nearest at its start moves away from its goal; a leg must take time
     if lanes[TRY_MISS, n] >= integration.tolerance or duration == 0.0:
         return chosen
     cost = edge_cost(medium.cost, duration)
@@ -266,7 +268,7 @@ def _settle(medium, lanes, n, edge, chosen):
 
 @entry_point(nogil=True)
 def connect_nodes(medium, steering, pairs, edges, first, last):
-    """The cheapest legs of the pairs of source[first:last] among the candidate controls of each pair.
+    """Find the cheapest leg of each pair of source[first:last] among the candidate controls of the pair.
 
     Outcomes into `edges` (pairs, EDGE_COLUMNS). Equal to `closest_approach` of every control: outcomes
     do not depend on which flights share the air.

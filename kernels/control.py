@@ -43,7 +43,7 @@ class Control(NamedTuple):
 
 @kernel
 def glide_speed(polar, direction, angle):
-    """V [m/s] at a glide angle's magnitude [rad]."""
+    """Return the speed V [m/s] at the magnitude of a glide angle [rad]."""
     last = polar.speed.shape[1] - 1
     span = polar.steepest[direction] - polar.shallowest[direction]
     at = min(max((angle - polar.shallowest[direction]) / span * last, 0.0), float(last))
@@ -54,26 +54,26 @@ def glide_speed(polar, direction, angle):
 
 @kernel
 def horizontal_speed(polar, direction, angle):
-    """V cos(gamma) [m/s]."""
+    """Return the horizontal speed V cos(gamma) [m/s]."""
     return glide_speed(polar, direction, angle) * math.cos(angle)
 
 
 @kernel
 def vertical_speed(polar, direction, angle):
-    """V |sin(gamma)| [m/s]; it rises with the angle."""
+    """Return the vertical speed V |sin(gamma)| [m/s]; it rises with the angle."""
     return glide_speed(polar, direction, angle) * math.sin(angle)
 
 
 @kernel
 def heading_of(x, y):
-    """The heading of a direction [rad], from -pi, which is west, up to but not including pi."""
+    """Return the heading [rad] of a direction, in [-pi, pi); -pi is west."""
     heading = math.atan2(y, x)
     return heading if heading < math.pi else -math.pi
 
 
 @shared
 def control_of(speed: float, glide_angle: float, heading: float) -> Control:
-    """The control of a speed through water [m/s], a signed glide angle and a heading [rad]."""
+    """Return the control with a speed through water [m/s], a signed glide angle and a heading [rad]."""
     along = speed * math.cos(glide_angle)
     u, v = along * math.cos(heading), along * math.sin(heading)
     return Control(u, v, speed * math.sin(glide_angle), glide_angle, heading, speed)
@@ -81,15 +81,15 @@ def control_of(speed: float, glide_angle: float, heading: float) -> Control:
 
 @kernel
 def control_towards(polar, direction, angle, heading):
-    """The control at a glide angle's magnitude and a heading [rad], at the polar's speed."""
+    """Return the control with a magnitude of the glide angle and a heading [rad], at the polar's speed."""
     return control_of(glide_speed(polar, direction, angle), angle if direction == CLIMB else -angle, heading)
 
 
 @kernel
 def angle_of_horizontal_speed(polar, direction, speed, outer):
-    """The angle between `outer`, one end of the range, and the fastest, at which V cos(gamma) = speed.
+    """Return the angle [rad] at which V cos(gamma) = speed, between `outer`, an end of the range, and the best.
 
-    `outer` itself where even that end is faster.
+    It is `outer` if even that end is faster.
     """
     slow = outer
     fast = polar.best_angle[direction]
@@ -106,7 +106,7 @@ def angle_of_horizontal_speed(polar, direction, speed, outer):
 
 @kernel
 def angle_of_vertical_speed(polar, direction, speed):
-    """The shallowest angle that sinks or climbs at least this fast; NaN where none does."""
+    """Return the shallowest angle [rad] with at least this vertical speed [m/s]; NaN if no angle has it."""
     low = polar.shallowest[direction]
     high = polar.steepest[direction]
     if vertical_speed(polar, direction, high) < speed:
@@ -124,7 +124,7 @@ def angle_of_vertical_speed(polar, direction, speed):
 
 @kernel
 def direction_of(pair):
-    """Whether a leg between the pair dives or climbs."""
+    """Return the direction of a leg between the pair: DIVE or CLIMB."""
     return CLIMB if pair.goal.z > pair.start.z else DIVE
 
 
@@ -175,7 +175,7 @@ Steering = Streamline | Surface
 
 @kernel
 def heading_on_line(plane, horizontal, branch):
-    """Heading of the control on the plane at a horizontal speed: V_min <= speed, branch +1 or -1.
+    """Return the heading [rad] of the control on the plane at a horizontal speed >= V_min; branch is +1 or -1.
 
     u = (-A C + branch B S) / R, v = (-B C - branch A S) / R, S = sqrt(R Vh^2 - C^2); the paper prints the
     same sign on both, which leaves the plane.
@@ -192,7 +192,7 @@ def _on_line(steering, flow, polar, pair, slowest, controls):
     plane = control_plane(flow, pair)
     if plane.lowest > polar.best_horizontal[direction]:
         return NO_CONTROL
-    # the part of the glide range that is fast enough for the plane and for the depth
+    # the part of the glide angles that is fast enough for the plane and for the depth
     shallow = angle_of_horizontal_speed(polar, direction, plane.lowest, polar.shallowest[direction])
     steep = angle_of_horizontal_speed(polar, direction, plane.lowest, polar.steepest[direction])
     needed = angle_of_vertical_speed(polar, direction, slowest)

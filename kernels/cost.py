@@ -1,4 +1,4 @@
-"""What an edge costs: so much for each second, so much for each leg."""
+"""The cost of an edge: a rate for each second and an amount for each leg."""
 
 from typing import NamedTuple
 
@@ -14,5 +14,5 @@ class CostRates(NamedTuple):
 
 @kernel
 def edge_cost(cost, duration):
-    """Cost of a leg from its duration [s]; it never falls as the duration grows."""
+    """Return the cost of a leg from its duration [s]; a longer leg never costs less."""
     return cost.per_second * duration + cost.per_leg

@@ -1,4 +1,4 @@
-"""Edges: what decides one, what becomes of a pair, what can be told of it before any control is flown."""
+"""Edges: what determines an edge, the status of a pair, and quick checks before any control is flown."""
 
 import math
 from enum import IntEnum
@@ -13,7 +13,7 @@ from .terrain import Terrain
 
 
 class Status(IntEnum):
-    """What became of a pair; every evaluated pair has exactly one."""
+    """The result of the evaluation of a pair; every evaluated pair has exactly one status."""
 
     CONNECTED = 0
     SAME_DEPTH = 1
@@ -33,11 +33,11 @@ BLOCKED = int(Status.BLOCKED)
 OUTSIDE_FLOW = int(Status.OUTSIDE_FLOW)
 
 CLEARANCE_SPACING = 5.0
-"""How closely [m] a leg is looked at for land and seabed."""
+"""A leg is checked for land and seabed at places this far apart [m]."""
 
 
 class Medium(NamedTuple):
-    """Everything that decides an edge but its ends and the steering."""
+    """Everything that determines an edge, except its ends and the steering."""
 
     flow: Flow
     terrain: Terrain
@@ -59,19 +59,19 @@ class Edge(NamedTuple):
 
 
 STATUS, TIME, COST, GLIDE_ANGLE, HEADING, SPEED, MISS = range(len(Edge._fields))
-"""Columns of an outcome: a row of the fields of an Edge."""
+"""Columns of an outcome; they are the fields of `Edge`."""
 EDGE_COLUMNS = len(Edge._fields)
 
 
 @inlined
 def no_edge(status):
-    """An edge that is not there, and why."""
+    """Return an edge that does not exist, with the status that says why."""
     return Edge(status, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @inlined
 def store(row, edge):
-    """The fields of an edge into `row` (EDGE_COLUMNS,)."""
+    """Write the fields of an edge into `row` (EDGE_COLUMNS,)."""
     row[STATUS] = edge.status
     row[TIME] = edge.time
     row[COST] = edge.cost
@@ -82,13 +82,13 @@ def store(row, edge):
 
 
 def edge_of(row: Array) -> Edge:
-    """The Edge of an outcome, for callers from Python."""
+    """Return the `Edge` of an outcome, for Python code."""
     return Edge(int(row[STATUS]), *(float(value) for value in row[TIME:]))
 
 
 @kernel
 def quick_status(medium, pair):
-    """What can be told of a pair before any control is looked at; CONNECTED where nothing forbids it."""
+    """Return the status of a pair that is known before any control is tried; CONNECTED if nothing forbids it."""
     flow, polar, integration = medium.flow, medium.polar, medium.integration
     p, q = pair
     if not (contains(flow, p.x, p.y, p.t) and contains(flow, q.x, q.y, p.t)):

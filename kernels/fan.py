@@ -29,7 +29,7 @@ FAN_VERTEX, FAN_LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
 """Rows of a lane beyond `flight`'s: its vertex, and the level that it flies to."""
 FAN_ROWS = FLIGHT_ROWS + 2
 IN_TIME = 1.0 + 1e-9
-"""A level this little beyond the horizon, as a share, is in time."""
+"""A level counts as reached in time up to this multiple of the horizon."""
 
 
 class FlowMap(NamedTuple):
@@ -44,7 +44,7 @@ class FlowMap(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """Where and when the controls of a fan set off, in which direction; their steps `dt` [s]."""
+    """The place and time at which the controls of a fan start, their direction, and their steps `dt` [s]."""
 
     origin: Place
     direction: int
@@ -100,7 +100,7 @@ class Look(NamedTuple):
 
 @kernel
 def outward_of(direction, backward):
-    """The way that a fan goes, up or down: against its direction where it flies back in time."""
+    """Return the vertical way of a fan: opposite to its direction if it flies back in time."""
     return 1 - direction if backward else direction
 
 
@@ -124,7 +124,7 @@ def layers_outward(bins, z, outward, deepest, heights, layers):
 
 @making
 def levels_in_reach(polar, bins, sweep):
-    """The levels that a fan may reach within its horizon."""
+    """Return the levels that a fan may reach within its horizon."""
     direction, z = sweep.launch.direction, sweep.launch.origin.z
     heights, layers = np.empty(MAX_LEVELS), np.empty(MAX_LEVELS, np.int64)
     outward = outward_of(direction, sweep.backward)
@@ -156,7 +156,7 @@ def fan_rows(polar, direction, nearest, horizon, rows):
 
 @kernel
 def _launch(polar, launch, heights, vertex, one, lanes, n):
-    """Send lane n off with a vertex's control, to the first level."""
+    """Start lane n with the control of a vertex, to the first level."""
     c = control_towards(polar, launch.direction, vertex[one, VERTEX_ANGLE], vertex[one, VERTEX_HEADING])
     place(lanes, n, launch.origin, c)
     lanes[FAN_VERTEX, n], lanes[FAN_LEVEL, n] = one, 0.0
@@ -199,7 +199,7 @@ def land_on_levels(medium, launch, heights, vertex, landing, first, last, lanes)
 
 @entry_point()
 def landings(medium, launch, height, angle, heading):
-    """Where controls of magnitude `angle` (n,) and `heading` (n,) [rad] land at a height [m]: x, y (n, 2) [m]."""
+    """Return the places x, y (n, 2) [m] where controls `angle` (n,), `heading` (n,) [rad] reach a height [m]."""
     vertex = np.ones((angle.size, 3))
     vertex[:, VERTEX_ANGLE], vertex[:, VERTEX_HEADING] = angle, heading
     landing = np.empty((angle.size, 2))
@@ -210,7 +210,7 @@ def landings(medium, launch, height, angle, heading):
 
 @making
 def coarsest_mesh(steering, rows, levels):
-    """A mesh without vertices."""
+    """Return a mesh without vertices."""
     unit = 2 << steering.generations
     lattice = np.full(((rows.size - 1) * unit + 1, steering.headings * unit), -1, np.int32)
     return Mesh(rows, unit, lattice, np.empty((512, 3)), np.empty((512, 2 * levels)))
@@ -218,7 +218,7 @@ def coarsest_mesh(steering, rows, levels):
 
 @kernel
 def coarsest_cells(polar, bins, sweep, levels, mesh, cells):
-    """The cells of the coarsest mesh, each with the levels that it takes part in, into `cells`; how many."""
+    """Write the cells of the coarsest mesh, each with its levels, into `cells`; return their number."""
     direction, z = sweep.launch.direction, sweep.launch.origin.z
     count = 0
     for i in range(mesh.rows.size - 1):
@@ -240,14 +240,14 @@ def coarsest_cells(polar, bins, sweep, levels, mesh, cells):
 
 @kernel
 def corner_of(mesh, cell, corner):
-    """Where a corner of a cell, halved, lies on the lattice; headings go round."""
+    """Return the place on the lattice of a corner of a halved cell; headings wrap around."""
     half = cell[CELL_SIZE] // 2
     return cell[CELL_ROW] + corner // 3 * half, (cell[CELL_COLUMN] + corner % 3 * half) % mesh.lattice.shape[1]
 
 
 @kernel
 def add_vertices(mesh, cell, new, count):
-    """Add the vertices of a halved cell that are not there; those from `new` on have not flown. How many now."""
+    """Add the missing vertices of a halved cell and return the count; those from `new` on have not flown yet."""
     top = 0
     while (cell[CELL_LEVELS] >> top) > 0:
         top += 1
@@ -269,7 +269,7 @@ def add_vertices(mesh, cell, new, count):
 
 @kernel
 def controls_of_quarter(mesh, cell, quarter, corners):
-    """The controls of a quarter of a cell."""
+    """Return the controls of a quarter of a cell."""
     half, turn = cell[CELL_SIZE] // 2, 2.0 * math.pi / mesh.lattice.shape[1]
     low, left = quarter // 2, quarter % 2
     angle = mesh.vertex[corners[3 * low], VERTEX_ANGLE]

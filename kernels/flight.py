@@ -1,4 +1,4 @@
-"""Flights: LANES trajectories in the air together, each for its own time; a lane that lands takes the next."""
+"""Flights: LANES trajectories are computed together, each for its own time; a lane that ends takes the next."""
 
 import math
 
@@ -33,7 +33,7 @@ FLIGHT_ROWS = _ROWS.stop
 
 @making
 def hangar(rows):
-    """Lanes of `rows` rows, all at rest: (rows, LANES)."""
+    """Return lanes (rows, LANES), all at rest."""
     lanes = np.zeros((rows, LANES))
     lanes[LANE_LEFT] = math.inf
     return lanes
@@ -49,7 +49,7 @@ def place(lanes, n, at, through):
 
 @inlined
 def keep_ends(lanes, n, pair):
-    """Note the ends of lane n's leg."""
+    """Store the ends of lane n's leg."""
     p, q = pair
     lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n] = p.x, p.y, p.z, p.t
     lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n], lanes[GOAL_T, n] = q.x, q.y, q.z, q.t
@@ -57,14 +57,14 @@ def keep_ends(lanes, n, pair):
 
 @inlined
 def ends_of(lanes, n):
-    """The ends of lane n's leg."""
+    """Return the ends of lane n's leg."""
     start = Place(lanes[START_X, n], lanes[START_Y, n], lanes[START_Z, n], lanes[START_T, n])
     return Pair(start, Place(lanes[GOAL_X, n], lanes[GOAL_Y, n], lanes[GOAL_Z, n], lanes[GOAL_T, n]))
 
 
 @inlined
 def fly_for(lanes, n, duration, dt):
-    """Let lane n fly for a duration [s], steps of `dt` and a last, shorter one; below 0 back in time."""
+    """Let lane n fly for a duration [s] in steps of `dt` [s] and a shorter last step; below 0 back in time."""
     step = math.copysign(dt, duration)
     full = math.ceil(duration / step) - 1.0
     lanes[LANE_LAST, n] = duration - full * step
@@ -74,13 +74,13 @@ def fly_for(lanes, n, duration, dt):
 
 @inlined
 def rest(lanes, n):
-    """Take lane n out of the air."""
+    """End the flight of lane n."""
     lanes[LANE_LEFT, n], lanes[LANE_STEP, n] = math.inf, 0.0
 
 
 @kernel
 def advance(flow, lanes):
-    """One RK4 step of every lane in the air; a lane whose LANE_LEFT is 0 has landed."""
+    """Make one RK4 step of every lane in flight; a lane whose LANE_LEFT is 0 has ended."""
     rk4_lanes(flow, lanes)
     flat = lanes.reshape(-1)
     for n in range(LANES):
@@ -94,7 +94,7 @@ def advance(flow, lanes):
 
 @kernel
 def widen(lanes):
-    """Let the boxes hold where the lanes are."""
+    """Extend the boxes to the places where the lanes are."""
     for n in range(LANES):
         x, y = lanes[LANE_X, n], lanes[LANE_Y, n]
         lanes[LANE_X_LO, n], lanes[LANE_X_HI, n] = min(lanes[LANE_X_LO, n], x), max(lanes[LANE_X_HI, n], x)
@@ -103,6 +103,6 @@ def widen(lanes):
 
 @kernel
 def stayed_inside(flow, lanes, n, t, duration):
-    """Whether lane n's box since t [s] is known to lie where the flow is known."""
+    """Return whether the flow is surely known in all of lane n's box from time t [s] on."""
     x_lo, x_hi = lanes[LANE_X_LO, n], lanes[LANE_X_HI, n]
     return contains_box(flow, x_lo, x_hi, lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n], t, t + duration)

@@ -16,12 +16,12 @@ from .cache import entry_point, in_kernels, inlined, kernel
 from .interpolate import pair_between
 
 JUST_BELOW = 1.0 - 2.0**-52
-"""The last point of a grid belongs to the cell below it, but for this."""
+"""A factor just below 1: it puts the last point of a grid into the cell before that point."""
 
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
 Numbers = NDArray[np.int64]
-"""Of nodes, pairs and where rows begin."""
+"""Numbers of nodes and pairs, and the positions where rows begin."""
 
 
 class Extent(NamedTuple):
@@ -177,7 +177,7 @@ def _jet(flow, x, y, z, t):
 
 @inlined
 def _cell(at, count):
-    """The cell below a fractional index, held within the grid, and the weight of its upper end."""
+    """Return the cell below a fractional index, kept within the grid, and the weight of its upper end."""
     # NaN (a step that left the grid) must not become an address: the comparisons send it to 0
     held = at if at > 0.0 else 0.0
     last = (count - 1.0) * JUST_BELOW
@@ -188,7 +188,7 @@ def _cell(at, count):
 
 @inlined
 def _slot(at, points, slots, slots_per_unit):
-    """As `_cell`, for uneven points: even slots lead to the cell, one comparison settles it."""
+    """Return the same as `_cell` for uneven points: an even slot leads to the cell, a comparison decides."""
     last = np.intp(points.size) - 1
     held = at if at > points[0] else points[0]
     held = held if held < points[last] else points[last]
@@ -209,7 +209,7 @@ def _grid(flow, x, y, z, t):
 
 @inlined
 def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
-    """Fractional grid indices (i, j) at (x, y) [m], from a map as `OceanGrid` describes it."""
+    """Return fractional grid indices (i, j) at (x, y) [m], from a map that `OceanGrid` describes."""
     p, a = _cell((x - x_lo) * per_x, index_map.shape[0])
     q, b = _cell((y - y_lo) * per_y, index_map.shape[1])
     return pair_between(index_map, (p, q), (a, b))
@@ -261,7 +261,7 @@ def _grid_carry(flow, z):
 
 
 class Abilities(NamedTuple):
-    """What a class of flow can do: the functions of the same names, for its own fields."""
+    """The functions of one class of flow; they have the names of the public functions."""
 
     velocity: Callable[..., Any]
     contains: Callable[..., Any] = _in_box
@@ -281,19 +281,19 @@ ABILITIES: dict[type, Abilities] = {
 
 
 def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float]:
-    """Current (u, v) [m/s], eastward and northward in the local frame, at (x, y, z) [m] and t [s]."""
+    """Return the current (u, v) [m/s] along x and y of the local frame, at (x, y, z) [m] and t [s]."""
     return ABILITIES[type(flow)].velocity(flow, x, y, z, t)
 
 
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
-    """Whether the flow is known at (x, y) [m] and time t [s]."""
+    """Return whether the flow is known at (x, y) [m] and time t [s]."""
     return ABILITIES[type(flow)].contains(flow, x, y, t)
 
 
 def contains_box(
     flow: Flow, x_lo: float, x_hi: float, y_lo: float, y_hi: float, t_lo: float, t_hi: float
 ) -> bool:
-    """Whether the flow is known to be known in a whole box [m, s]; a quick look before a close one."""
+    """Return whether the flow is surely known in a whole box [m, s]; a quick check before an exact one."""
     return ABILITIES[type(flow)].contains_box(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
 
 
@@ -311,7 +311,7 @@ for _ability in (velocity, contains, contains_box, carry):
 
 
 def fields_of(flow: tuple[Any, ...]) -> dict[str, Any]:
-    """A flow's fields (or a terrain's) by name, those of its extent among them."""
+    """Return the fields of a flow or a terrain by name, with the fields of its extent."""
     fields: dict[str, Any] = flow._asdict()  # type: ignore[attr-defined]
     extent = fields.pop("extent", None)
     return fields if extent is None else fields | extent._asdict()
@@ -319,7 +319,7 @@ def fields_of(flow: tuple[Any, ...]) -> dict[str, Any]:
 
 @kernel
 def mean_velocity(flow, x, y, z_from, z_to, t):
-    """The 2.5-D flow of a pair: the mean of the currents at its two depths [m/s]."""
+    """Return the 2.5-D flow of a pair: the mean of the currents at its two depths [m/s]."""
     u_from, v_from = velocity(flow, x, y, z_from, t)
     u_to, v_to = velocity(flow, x, y, z_to, t)
     return 0.5 * (u_from + u_to), 0.5 * (v_from + v_to)
@@ -327,7 +327,7 @@ def mean_velocity(flow, x, y, z_from, z_to, t):
 
 @entry_point(nogil=True)
 def sample_lines(flow, x, y, z, t, uv, first, last):
-    """`velocity` at time t on the mesh of x, y, z, into uv (z, x, y, 2), lines first..last - 1 along y."""
+    """Write `velocity` at time t on the mesh of x, y, z into uv (z, x, y, 2), lines first..last - 1 along y."""
     for n in range(first, last):
         k, i = n // x.size, n % x.size
         for j in range(y.size):
@@ -336,7 +336,7 @@ def sample_lines(flow, x, y, z, t, uv, first, last):
 
 @entry_point()
 def velocities(flow, x, y, z, t):
-    """`velocity` at many points: x, y, z, t of shape (n,), result (n, 2) [m/s]; for callers from Python."""
+    """Return `velocity` at many points for Python code: x, y, z, t have shape (n,), the result (n, 2) [m/s]."""
     uv = np.empty((x.size, 2))
     for n in range(x.size):
         uv[n] = velocity(flow, x[n], y[n], z[n], t[n])

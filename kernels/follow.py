@@ -59,9 +59,9 @@ _COLUMNS = range(LEG_COLUMNS, LEG_COLUMNS + 10)
 LEG_INVERSE = _COLUMNS[0]
 """The first of four: d(angle, heading) / d(x, y) of the flow map there."""
 LEG_COARSE_X, LEG_COARSE_Y = _COLUMNS[4:6]
-"""How far its coarse flight lands from its fine one [m]."""
+"""The distance [m] between the ends of its coarse flight and of its fine flight."""
 LEG_RATE_A, LEG_RATE_H = _COLUMNS[6:8]
-"""By how much its control changes with the departure [rad/s]."""
+"""The rate at which its control changes with the departure [rad/s]."""
 LEG_KNOWN, LEG_CHOSEN = _COLUMNS[8:]
 """Whether the columns from LEG_INVERSE on are known; whether it is one of the node's edges, not only followed."""
 FOLLOWED_COLUMNS = _COLUMNS.stop
@@ -71,7 +71,7 @@ GUESS_COLUMNS = FOLLOWED_COLUMNS + 3
 SLOT_NODE, SLOT_TRIES, SLOT_PENDING = range(3)
 """Of each leg of a batch: its node's place there, guesses that were flown for it, the guess that waits for it."""
 NOBODYS, NOT_ASKED = -1, -2
-"""Instead of the number of a leg: nobody has looked for one to this node; nobody may."""
+"""Two values instead of the number of a leg: no leg to this node was searched yet; none may be searched."""
 
 COARSE_STEP = 6.0
 """Steps of a coarse flight, in steps of a leg: where it lands is corrected by how far off it was before."""
@@ -81,20 +81,20 @@ FORESEEN = 0.02
 """Nor does a step need a flight, from a miss of NEAR at most, if no more than that [m] is left when it shrinks
 the miss as the step before did. From further a step is less like the one before: 0.4 m were left of 1.5 m."""
 NEAR = 0.3
-"""From so near [m] the next step lands on the target."""
+"""From a miss below this [m] the next step lands on the target."""
 MOST_COARSE, MOST_FINE = 7, 4
 GIVE_UP = 3
-"""By this coarse flight, from 0, a guess that leads anywhere has cut its miss to a quarter."""
+"""A guess is given up if it has not reduced its miss to a quarter by this coarse flight, counted from 0."""
 TILT = 1e-3
-"""Change of a control [rad] by which the flow map's derivatives are measured."""
+"""A control is changed by this much [rad] to measure the derivatives of the flow map."""
 MOST_TRIES = 3
-"""Guesses out of its neighbours that are flown for a target."""
+"""For a target at most this many guesses from its neighbours are flown."""
 FURTHEST = 1.0
-"""A neighbour's guess that is turned further [rad] is none."""
+"""A guess from a neighbour is dropped if its control was turned by more than this [rad]."""
 BEYOND, BENT = 0.04, 0.25
 """A guess so far [rad] beyond the glide polar's end is flown from its end, and BENT times its turn squared."""
 SPREADS = 1.05
-"""A neighbour's guess that may arrive later, in times of the slowest edge, is none."""
+"""A guess from a neighbour is dropped if it may take longer than this multiple of the slowest edge's time."""
 HELD = 1.1
 """Legs slower than the slowest edge are followed too, to so many times its time, where edges have a limit."""
 
@@ -124,7 +124,7 @@ def _send(medium, position, source, departure, since, guess, lanes, n):
 
 @kernel
 def _turned(polar, lanes, n, off_x, off_y):
-    """Turn lane n's control by what its miss [m] asks for; False where the glide polar ends there."""
+    """Turn lane n's control to remove its miss [m]; False if the glide polar ends before that."""
     direction = int(lanes[AIM_DIRECTION, n])
     lanes[AIM_OFF_X, n], lanes[AIM_OFF_Y, n] = off_x, off_y
     turn_a = -(lanes[AIM_INVERSE, n] * off_x + lanes[AIM_INVERSE + 1, n] * off_y)
@@ -175,7 +175,7 @@ def _measure(polar, lanes, n, off_x, off_y, since, dt):
 
 @kernel
 def _meet(integration, lanes, n, miss):
-    """Lane n has met its target, but for a miss [m]: HIT where that is below the tolerance."""
+    """End lane n with a miss [m]: its state is HIT if the miss is below the tolerance, else LOST."""
     lanes[AIM_MISS, n] = miss
     lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
     lanes[AIM_STATE, n] = HIT if miss < integration.tolerance else LOST
@@ -184,7 +184,7 @@ def _meet(integration, lanes, n, miss):
 
 @kernel
 def _landed(polar, integration, since, lanes, n):
-    """Lane n has landed: on its target, HIT; nowhere near, LOST; else it is turned, and flies again."""
+    """Decide on lane n after its landing: HIT on its target, LOST far from it; else turn it and fly again."""
     dt = integration.dt
     _, goal = ends_of(lanes, n)
     off_x, off_y = lanes[LANE_X, n] - goal.x, lanes[LANE_Y, n] - goal.y
@@ -236,7 +236,7 @@ def _landed(polar, integration, since, lanes, n):
 
 @making
 def _fly(medium, position, source, departure, since, guesses, count, legs, lanes):
-    """Fly all guesses to their ends; what is met becomes the leg."""
+    """Fly all guesses to their ends; a guess that reaches its target becomes the leg."""
     flying = np.zeros(LANES, np.int64)
     horizon = horizon_of(medium)
     following, busy = 0, 0
@@ -269,7 +269,7 @@ def _fly(medium, position, source, departure, since, guesses, count, legs, lanes
 
 @kernel
 def _take(medium, lanes, n, leg):
-    """Make the leg of what lane n has found, where it passes the checks."""
+    """Make a leg from the result of lane n if it passes the checks."""
     if lanes[_MODE, n] == _COARSE:
         # between its steps it may have been a little further out
         between = 0.5 * COARSE_STEP * medium.integration.dt
@@ -319,7 +319,7 @@ def _neighbours_guess(polar, position, z_p, leg, over_x, over_y, r, guess):
 
 @kernel
 def _over_ground(medium, position, z_p, departure, leg):
-    """A leg's velocity over ground [m/s] where it ends."""
+    """Return the velocity over ground [m/s] at the end of a leg."""
     direction = CLIMB if leg[LEG_ANGLE] > 0.0 else DIVE
     x, y, z = position[int(leg[LEG_NODE])]
     angle = abs(leg[LEG_ANGLE])
@@ -454,7 +454,7 @@ def follow_nodes(
 
 @kernel
 def _moved_on(polar, guess, since):
-    """Move a leg's control on as it moved before."""
+    """Change a leg's control at the same rate as before."""
     climbs = guess[LEG_ANGLE] > 0.0
     direction = CLIMB if climbs else DIVE
     low, high = polar.shallowest[direction], polar.steepest[direction]
@@ -465,7 +465,7 @@ def _moved_on(polar, guess, since):
 
 @kernel
 def _note_rates(legs, since, held, holds, first, last):
-    """By how much the controls of the legs that were followed have changed with the departure."""
+    """Measure the rates at which the controls of the followed legs have changed with the departure."""
     at = 0
     for n in range(first, last):
         for k in range(holds[n]):

@@ -1,4 +1,4 @@
-"""Legs flown as they are told: many controls, each from its own place and time for its own duration."""
+"""Flies legs with given controls: each leg has its place, its time and its duration."""
 
 from .cache import entry_point, inlined, kernel
 from .edges import CLEARANCE_SPACING
@@ -12,7 +12,7 @@ _LEG = FLIGHT_ROWS
 
 @inlined
 def _leg_of(start, through, leg):
-    """Where a leg begins, and its velocity through water."""
+    """Return the place where a leg begins, and its velocity through water."""
     x, y, z, t = start[leg]
     u, v, w = through[leg]
     return Place(x, y, z, t), Velocity(u, v, w)
@@ -20,7 +20,7 @@ def _leg_of(start, through, leg):
 
 @kernel
 def _take_off(start, through, duration, dt, leg, lanes, n):
-    """Send lane n off on a leg."""
+    """Start lane n on a leg."""
     at, velocity = _leg_of(start, through, leg)
     place(lanes, n, at, velocity)
     fly_for(lanes, n, duration[leg], dt)

@@ -73,7 +73,7 @@ def closest_approach(flow, pair, through, integration):
     first, last = arrival_window(w, goal.z - start.z, integration.tolerance)
     window_opens = int(first / dt)
     window_closes = min(integration.steps, int(last / dt) + 1)
-    # what the control itself adds between the window's ends, and what may still hit
+    # the distance that the control adds between the window's ends, and the tolerance
     slack = math.hypot(u, v) * (window_closes * dt - first) + integration.tolerance
     carry_end = carry(flow, start.z + window_closes * dt * w)
     miss = math.inf
@@ -115,13 +115,13 @@ def trace(flow, start, through, duration, dt):
 
 @entry_point()
 def traced(flow, start, through, duration, dt):
-    """`trace`, for callers from Python."""
+    """Return the result of `trace`, for Python code."""
     return trace(flow, start, through, duration, dt)
 
 
 @making
 def stays_inside(flow, start, through, duration, dt):
-    """Whether every step of the leg begins where the flow is known."""
+    """Return whether each step of the leg begins where the flow is known."""
     rows = trace(flow, start, through, duration, dt)
     inside = True
     for n in range(rows.shape[0] - 1):
@@ -132,7 +132,7 @@ def stays_inside(flow, start, through, duration, dt):
 
 @making
 def is_clear(flow, terrain, start, through, duration, dt, spacing):
-    """Whether the whole leg stays where `terrain` allows a glider to be, looked at every `spacing` [m]."""
+    """Return whether the whole leg stays where `terrain` allows a glider; it is checked every `spacing` [m]."""
     if open_between(terrain, start.z, start.z + through.w * duration):
         return True
     rows = trace(flow, start, through, duration, dt)

@@ -20,7 +20,7 @@ BENT = 8.0
 MARGIN = 0.35
 """A target this far outside a triangle, in its own units, is a guess where none is inside."""
 MAX_LEVELS = 32
-"""Depths at most that a fan lands on: the bits of a cell's levels."""
+"""A fan lands on at most this many depths, because the levels of a cell are bits of a number."""
 
 
 class NodeBins(NamedTuple):
@@ -92,13 +92,13 @@ def bin_range(low, high, origin, per_bin, count):
 
 @inlined
 def is_wanted(nodes, node):
-    """Whether a node is looked for."""
+    """Return whether a node is wanted."""
     return nodes.wanted.size == 0 or nodes.wanted[node]
 
 
 @kernel
 def any_wanted(nodes, layer, box):
-    """Whether a wanted node of the layer lies in a box."""
+    """Return whether a wanted node of the layer lies in a box."""
     bins, position = nodes.bins, nodes.position
     i_first, i_last = bin_range(box.x_lo, box.x_hi, bins.x_lo, bins.per_bin, bins.nx)
     j_first, j_last = bin_range(box.y_lo, box.y_hi, bins.y_lo, bins.per_bin, bins.ny)
@@ -125,7 +125,7 @@ def _inside(ax, ay, bx, by, cx, cy, x, y):
 
 @inlined
 def wider(box, room):
-    """The box with so much more room [m] on every side."""
+    """Return the box extended by a margin [m] on every side."""
     return Box(box.x_lo - room, box.x_hi + room, box.y_lo - room, box.y_hi + room)
 
 
@@ -174,7 +174,7 @@ def _around(bins, patches):
 
 @kernel
 def _bend(p):
-    """How far [m] a patch is from flat: the greatest distance of its middle lines from its linear image."""
+    """Return how far [m] a patch is from flat: the greatest distance of its middle lines from a linear image."""
     x = p[0, 0] - p[1, 0] - p[2, 0] + p[3, 0]
     y = p[0, 1] - p[1, 1] - p[2, 1] + p[3, 1]
     twist = 0.25 * math.sqrt(x * x + y * y)
@@ -184,7 +184,7 @@ def _bend(p):
 
 @kernel
 def _folded(p):
-    """Whether the two triangles of a patch are turned opposite ways."""
+    """Return whether the two triangles of a patch have opposite orientations."""
     low = (p[2, 0] - p[0, 0]) * (p[1, 1] - p[0, 1]) - (p[1, 0] - p[0, 0]) * (p[2, 1] - p[0, 1])
     high = (p[1, 0] - p[3, 0]) * (p[2, 1] - p[3, 1]) - (p[2, 0] - p[3, 0]) * (p[1, 1] - p[3, 1])
     return low * high <= 0.0
@@ -244,7 +244,7 @@ def _in_triangles(p, x, y):
 
 @kernel
 def _guess(p, x, y, cell, rows, at):
-    """The cell's control that lands on (x, y) by its patch, into rows[at]; False where it is too far outside."""
+    """Write into rows[at] the cell's control that lands on (x, y) by its patch; False if too far outside."""
     s, r, outside = _in_triangles(p, x, y)
     if outside > MARGIN:
         return False

@@ -42,17 +42,18 @@ from .place import Pair, Place
 from .steer import AIM_INVERSE, AIM_MISS, AIM_ROWS, AIM_STATE, AIM_TIME, HIT, OPEN, aim, control_in, correct
 
 MAX_TRIES = 12
-"""Guesses that are polished for one node."""
+"""At most this many guesses are polished for one node."""
 FAN_STEP = 8.0
-"""Steps of a fan, in steps of a leg: it gives first guesses."""
+"""The step of a fan as a multiple of the step of a leg; it may be longer, because a fan gives only first
+guesses."""
 SPARE, LONGER = 1.3, 1.2
 """A deadline should suffice for SPARE times the limit; each is at least LONGER times the one before."""
 LATEST = 1.1
-"""A guess that arrives later, in deadlines, is not polished."""
+"""A guess is not polished if it takes longer than this multiple of the deadline."""
 SURE = 2.0
 """A flight is given up that is late even if its next step changes its time SURE times as much as the last."""
 INSIDE = 1e-9
-"""A guess this little outside its triangle is inside."""
+"""A guess that lies outside its triangle by less than this counts as inside."""
 TASK_ORIGIN, TASK_DIRECTION, TASK_DEADLINE, TASK_DONE = range(4)
 """Columns of a task: the point it is for, its direction, by when its legs arrive [s], whether it is done."""
 TASK_COLUMNS = 4
@@ -101,20 +102,20 @@ class Turns(NamedTuple):
 
 @making
 def ranks(keys):
-    """The order of keys, rising; of equal ones the first."""
+    """Return the order that sorts keys; equal keys keep their order."""
     return np.argsort(keys, kind="mergesort")
 
 
 @kernel
 def place_of(points, n):
-    """Point n, and when legs leave it."""
+    """Return point n and the time at which legs leave it."""
     x, y, z = points.position[n]
     return Place(x, y, z, points.departure[n])
 
 
 @kernel
 def checked_leg(medium, lanes, n):
-    """The leg that lane n has found, if it stays where the flow is known and where the terrain allows."""
+    """Return the leg of lane n; without an edge if it leaves the known flow or the terrain blocks it."""
     flow, dt = medium.flow, medium.integration.dt
     c, time = control_in(medium.polar, lanes, n), lanes[AIM_TIME, n]
     start, goal = ends_of(lanes, n)
@@ -202,7 +203,7 @@ def _aim_at(medium, position, points, tasks, guess, lanes, n):
 
 @kernel
 def _correct(medium, lanes, n, deadline):
-    """Lane n has landed: correct its control, so that it flies again; False where its guess is settled."""
+    """Correct the control of lane n after its landing, so that it flies again; False if its guess is finished."""
     before = lanes[AIM_TIME, n]
     correct(medium.polar, medium.integration, lanes, n)
     time = lanes[AIM_TIME, n]
@@ -211,7 +212,7 @@ def _correct(medium, lanes, n, deadline):
 
 @kernel
 def _keep_cheaper(medium, lanes, n, deadline, edge):
-    """Let what lane n has found be the edge, where it arrives in time, is cheaper and passes the checks."""
+    """Make the leg of lane n the edge if it arrives in time, is cheaper and passes the checks."""
     known, time = edge[STATUS] == CONNECTED, lanes[AIM_TIME, n]
     if lanes[AIM_STATE, n] != HIT or time > deadline or (known and edge_cost(medium.cost, time) >= edge[COST]):
         return
@@ -252,7 +253,7 @@ def polish(medium, position, points, tasks, guesses, lanes):
     turns = in_turn(medium.polar, position, points, tasks, guesses)
     rows = guesses.rows
     found = nothing_found(turns, rows)
-    # in the order of the nodes: lanes side by side fly through the same water
+    # in the order of the nodes, so that neighbouring lanes fly through the same water
     following = turns.begin[:-1].copy()
     group = np.zeros(LANES, np.int64)
     lanes[LANE_LEFT] = math.inf
@@ -303,7 +304,7 @@ def nodes_near(bins, layer, x, y, radius):
 
 @kernel
 def nodes_swept(bins, polar, launch, backward, deadline):
-    """How many nodes a fan may pass over before the deadline [s].
+    """Return the number of nodes that a fan may pass over before the deadline [s].
 
     In still water a fan sweeps, at a height, the ring between its shallowest and its steepest glide; a current
     without divergence moves and bends it.
@@ -348,7 +349,7 @@ def later_deadline(bins, polar, launch, backward, deadline, arrived, limit, hori
 
 @kernel
 def end_of(rows, task, begin):
-    """Where the rows of a task end that begin at `begin`."""
+    """Return the end of the rows of the task whose rows begin at `begin`."""
     end = begin
     while end < rows.shape[0] and rows[end, FOUND_TASK] == task:
         end += 1
@@ -357,13 +358,13 @@ def end_of(rows, task, begin):
 
 @kernel
 def horizon_of(medium):
-    """The longest time [s] that a leg may take."""
+    """Return the longest time [s] that a leg may take."""
     return medium.integration.dt * medium.integration.steps
 
 
 @kernel
 def launch_of(medium, points, task):
-    """The fan of a task, its steps those of a fan."""
+    """Return the fan of a task, with the steps of a fan."""
     origin = place_of(points, int(task[TASK_ORIGIN]))
     return Launch(origin, int(task[TASK_DIRECTION]), medium.integration.dt * FAN_STEP)
 
@@ -460,7 +461,7 @@ def settle_tasks(medium, bins, points, tasks, rows, limit, legs, is_settled):
 @making
 def keep_cheapest(found, limit, legs, n):
     """What is found for one task, the cheapest `limit` if there is one, into the legs of point n."""
-    # NaN, the cost of what is not connected, sorts last
+    # NaN is the cost of pairs that are not connected; it sorts last
     kept = ranks(found[:, FOUND_EDGE + COST].copy())
     last = min(limit, found.shape[0]) if limit > 0 else found.shape[0]
     for k in range(last):
@@ -471,7 +472,7 @@ def keep_cheapest(found, limit, legs, n):
 
 @entry_point(nogil=True)
 def reach_points(medium, steering, nodes, points, limit, legs, first, last):
-    """The cheapest exact legs between the points first..last - 1 and nodes, into `legs`, by rising node.
+    """Write the cheapest exact legs between the points first..last - 1 and nodes into `legs`, by rising node.
 
     With a `limit`, a fan is cut at a deadline, which is put off until that many of its legs arrive before
     it; the fastest so many are kept of each direction. `nodes.wanted` is made here.

@@ -36,7 +36,7 @@ from .reach import (
 from .steer import AIM_ROWS
 
 TILT = 1e-3
-"""Change of a control [rad] by which the flow map's derivatives are measured."""
+"""A control is changed by this much [rad] to measure the derivatives of the flow map."""
 MAX_LEAP = 1.0
 """A candidate whose first Newton step is longer [rad] is no guess: beyond lie 0.2 % of the edges."""
 
@@ -55,7 +55,7 @@ def tilted(polar, direction, controls, count, vertex):
 
 @kernel
 def nearest_of_its_branch(landing, count, n, x, y):
-    """Whether candidate n lands nearer to (x, y) than its neighbours on its own branch of the line."""
+    """Return whether candidate n lands nearer to (x, y) than its neighbours on the same branch of the line."""
     miss = math.hypot(landing[3 * n, 0] - x, landing[3 * n, 1] - y)
     for other in (n - 2, n + 2):
         if 0 <= other < count and math.hypot(landing[3 * other, 0] - x, landing[3 * other, 1] - y) < miss:
@@ -65,7 +65,7 @@ def nearest_of_its_branch(landing, count, n, x, y):
 
 @kernel
 def guess_of(vertex, landing, n, goal, guess):
-    """Candidate n, with the flow map's derivatives there, as a first guess, into a row; False if it is none."""
+    """Write candidate n and the flow map's derivatives into a row as a first guess; False if it is no guess."""
     at, a, h = 3 * n, 3 * n + 1, 3 * n + 2
     da = vertex[a, VERTEX_ANGLE] - vertex[at, VERTEX_ANGLE]
     dh = vertex[h, VERTEX_HEADING] - vertex[at, VERTEX_HEADING]
@@ -85,7 +85,7 @@ def guess_of(vertex, landing, n, goal, guess):
 
 @making
 def guesses_on_line(vertex, landing, candidates, goal, task, node, guesses):
-    """First guesses out of landed candidates, added to the guesses that are there."""
+    """Add first guesses from landed candidates to the guesses that exist."""
     rows, count = guesses
     rows = longer(rows, count + candidates)
     for n in range(candidates):

@@ -1,4 +1,4 @@
-"""Steering: Broyden steps from a guess to the control that lands on its target, many problems in the air."""
+"""Steering: Broyden steps lead from a guess to the control that lands on its target; many guesses together."""
 
 import math
 
@@ -8,12 +8,12 @@ from .flight import FLIGHT_ROWS, ends_of, fly_for, keep_ends, place, rest
 from .motion import LANE_X, LANE_Y
 
 LANDING_TOLERANCE = 0.009
-"""A landing this close to its target [m] is a hit, where it is nearer than the scenario's tolerance, too."""
+"""A landing this close to its target [m] is a hit, if it is also within the scenario's tolerance."""
 FIRST_STEP = 3.0
 """Steps of a guess's first flight, in steps of a leg: where it lands is corrected anyway."""
 MAX_ITERATIONS = 14
 GIVE_UP = 5
-"""By this iteration a guess that leads anywhere has cut its miss to a quarter."""
+"""A guess is given up if it has not reduced its miss to a quarter by this iteration."""
 MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
@@ -25,7 +25,7 @@ AIM_INVERSE = _ROWS[6]
 AIM_OFF_X, AIM_OFF_Y, AIM_TURN_A, AIM_TURN_H, _FIRST_MISS, _ITERATION = _ROWS[10:]
 AIM_ROWS = _ROWS.stop
 OPEN, HIT, LOST = 1.0, 2.0, 3.0
-"""States: closing in; landed on the target; it leads nowhere."""
+"""States: still improving; landed on the target; given up."""
 
 
 @kernel
@@ -42,7 +42,7 @@ def aim(polar, lanes, n, direction, pair, angle, heading, dt):
 
 @inlined
 def control_in(polar, lanes, n):
-    """Lane n's control."""
+    """Return the control of lane n."""
     return control_towards(polar, int(lanes[AIM_DIRECTION, n]), lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n])
 
 
@@ -81,7 +81,7 @@ def correct(polar, integration, lanes, n):
     low, high = polar.shallowest[direction], polar.steepest[direction]
     angle = min(max(lanes[AIM_ANGLE, n] + shorten * turn_a, low), high)
     lanes[AIM_TURN_A, n], lanes[AIM_TURN_H, n] = angle - lanes[AIM_ANGLE, n], shorten * turn_h
-    # a second step beyond the glide polar's end, or none at all
+    # give up after a second step beyond the end of the glide polar, or if there is no step
     stuck = iteration > 0.0 and lanes[AIM_TURN_A, n] == 0.0 and (turn_a != 0.0 or turn_h == 0.0)
     astray = iteration == GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
     if stuck or astray or iteration == MAX_ITERATIONS - 1 or not miss < math.inf:

@@ -1,4 +1,4 @@
-"""Terrain: where a glider may be. Seabed and land, as a height of the bottom over the frame."""
+"""Terrain: the places where a glider may be. Seabed and land are given as the height of the bottom."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -51,7 +51,7 @@ _ALLOWED: dict[type, Callable[..., Any]] = {OpenWater: _open_water, Seabed: _sea
 
 
 def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
-    """Whether a glider may be at (x, y, z) [m]."""
+    """Return whether a glider may be at (x, y, z) [m]."""
     return _ALLOWED[type(terrain)](terrain, x, y, z)
 
 
@@ -70,7 +70,7 @@ _OPEN_BETWEEN: dict[type, Callable[..., Any]] = {OpenWater: _open_between, Seabe
 
 
 def open_between(terrain: Terrain, z: float, z_end: float) -> bool:
-    """Whether all water between two heights [m] is known to be allowed; a quick look before a close one."""
+    """Return whether all water between two heights [m] is surely allowed; a quick check before an exact one."""
     return _OPEN_BETWEEN[type(terrain)](terrain, z, z_end)
 
 

@@ -37,13 +37,13 @@ def corrected(when, early, time_early, late, time_late, learnt, times, first, la
 
 @kernel
 def _sooner(key, a, b):
-    """Whether node a goes before node b: by time, then by number."""
+    """Return whether node a comes before node b: by time, then by number."""
     return key[a] < key[b] or (key[a] == key[b] and a < b)
 
 
 @kernel
 def _rise(heap, place, key, at):
-    """Let the node at a place of the heap rise to where it belongs."""
+    """Move the node at a place of the heap up to its right place."""
     node = heap[at]
     while at > 0:
         above = (at - 1) // 2
@@ -58,7 +58,7 @@ def _rise(heap, place, key, at):
 
 @kernel
 def _sink(heap, place, key, size):
-    """Let the node at the top of the heap sink to where it belongs."""
+    """Move the node at the top of the heap down to its right place."""
     node = heap[0]
     at = 0
     while 2 * at + 1 < size:
