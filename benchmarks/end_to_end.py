@@ -131,7 +131,8 @@ def washington(file: str) -> Scenario:
     """Two days along the coast in a three-hourly forecast: its currents outrun the glider, which drifts about."""
     return read_scenario("ionian", [
         f"flow.file={file}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-126.1,-125.4]",
-        "domain.lat=[46.9,47.7]", "sampling.shape=[30,52,2]", "query.start=[-125.75,47.2,0.0]",
+        "domain.lat=[46.9,47.7]", "sampling.kind=grid", "sampling.shape=[30,52,2]",
+        "query.start=[-125.75,47.2,0.0]",
         "query.goal=[-125.75,47.5,0.0]",
     ])  # fmt: skip
 
@@ -141,7 +142,8 @@ def galicia(file: str) -> Scenario:
     return read_scenario("ionian", [
         f"flow.file={file}", "flow.epoch=2025-01-01T00:00:00", "terrain.clearance=10.0",
         "domain.lon=[-9.24,-9.21]", "domain.lat=[42.09,42.38]", "domain.depth=[0.0,110.0]",
-        "sampling.shape=[16,205,2]", "integration.dt=20.0", "query.start=[-9.225,42.092,0.0]",
+        "sampling.kind=grid", "sampling.shape=[16,205,2]", "integration.dt=20.0",
+        "query.start=[-9.225,42.092,0.0]",
         "query.goal=[-9.225,42.374,0.0]",
     ])  # fmt: skip
 

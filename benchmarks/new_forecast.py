@@ -26,7 +26,8 @@ def main():
     options.add_argument("currents")
     options.add_argument("--nodes", default="[220,235,2]", help="sampling.shape of the scenario")
     asked = options.parse_args()
-    wide = ["domain.lon=[17.7,18.85]", "domain.lat=[37.2,38.2]", f"sampling.shape={asked.nodes}"]
+    wide = ["domain.lon=[17.7,18.85]", "domain.lat=[37.2,38.2]"]
+    wide += ["sampling.kind=grid", f"sampling.shape={asked.nodes}"]
     domain = read_scenario("ionian", [*wide, f"flow.file={asked.currents}"]).domain
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)

@@ -28,12 +28,14 @@ FORMS = ("route.json", "route.geojson", "route.kml", "route.gpx", "route.csv", "
 # hours, but comes back to most nodes on the way, and to follow all that takes many minutes
 ROUTES = {
     "ionian": [
-        f"flow.file={IONIAN}", "domain.lon=[17.9,18.8]", "domain.lat=[37.3,38.3]", "sampling.shape=[62,88,2]",
+        f"flow.file={IONIAN}", "domain.lon=[17.9,18.8]", "domain.lat=[37.3,38.3]",
+        "sampling.kind=grid", "sampling.shape=[62,88,2]",
         "query.start=[18.0,38.2,0.0]", "query.goal=[18.7,37.42,0.0]",
     ],
     "washington": [
         f"flow.file={WASHINGTON}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-125.9,-125.5]",
-        "domain.lat=[46.8,47.9]", "sampling.shape=[26,98,2]", "query.start=[-125.6,46.9,0.0]",
+        "domain.lat=[46.8,47.9]",
+        "sampling.kind=grid", "sampling.shape=[26,98,2]", "query.start=[-125.6,46.9,0.0]",
         "query.goal=[-125.6,47.85,0.0]", "query.frozen=true",
     ],
 }  # fmt: skip

@@ -1,6 +1,7 @@
 """A figure of several routes of one problem: on a map, in space, and as depth against time, with their times."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 LOOKS = (("#d55e00", (0, (4.0, 1.2))), ("#0072b2", "-"), ("#009e73", (0, (6, 1, 1, 1))), (INK, ":"))
 """Colour and line of each route: they differ in print and for people who see few colours (Okabe, Ito 2008)."""
+
+LABEL_WIDTH, LABEL_HEIGHT = 0.3, 28.0
+"""An arrival's label takes so much of the panel's width at the most, and is so high [points]."""
 
 
 def plot_routes(
@@ -92,13 +96,23 @@ def _seconds(time: float) -> str:
     return f"{time:,.0f} s" if name == "s" else f"{time:,.0f} s ({time_text(time)})"
 
 
+def _label_levels(ends: Sequence[float]) -> list[int]:
+    """Return how high each label at an end (a share of the panel's width) is put, so that none covers another."""
+    levels = [0] * len(ends)
+    order = sorted(range(len(ends)), key=lambda n: ends[n])
+    for before, after in pairwise(order):
+        levels[after] = levels[before] + 1 if ends[after] - ends[before] < LABEL_WIDTH else 0
+    return levels
+
+
 def _draw_profile(ax: Any, paths: Mapping[str, "Path"], rows: Mapping[str, Array]) -> None:
     """Draw depth against time, and the time at which each route ends."""
     last = max(path.travel_time for path in paths.values())
     unit, unit_name = time_unit(last)
     deepest = max(float(-row[:, 3].min()) for row in rows.values())
+    levels = _label_levels([path.travel_time / last for path in paths.values()])
     look: dict[str, Any]
-    for (name, path), (colour, line) in zip(paths.items(), LOOKS, strict=False):
+    for (name, path), (colour, line), level in zip(paths.items(), LOOKS, levels, strict=False):
         time, depth = rows[name][:, 0] / unit, -rows[name][:, 3] + 0.0
         ax.plot(time, depth, color=colour, linestyle=line, linewidth=2.2, zorder=5)
         end = path.travel_time / unit
@@ -107,7 +121,11 @@ def _draw_profile(ax: Any, paths: Mapping[str, "Path"], rows: Mapping[str, Array
             [end], depth[-1:], marker="*", s=150, color="white", edgecolors=colour, linewidths=1.3, zorder=7
         )
         late = end > 0.85 * last / unit
-        look = {"xytext": (-5 if late else 5, 4), "textcoords": "offset points", "color": colour}
+        look = {
+            "xytext": (-5 if late else 5, 4 + level * LABEL_HEIGHT),
+            "textcoords": "offset points",
+            "color": colour,
+        }
         look |= {"ha": "right" if late else "left", "va": "bottom"}
         text = f"{name} arrives\nafter {_seconds(path.travel_time)}"
         ax.annotate(text, (end, 1.12 * deepest), **look)

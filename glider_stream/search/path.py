@@ -304,6 +304,9 @@ def load_path(file: str | File) -> Path:
         clock = np.concatenate([[0.0], *(leg.trajectory[:, 0] for leg in legs)])
         require(bool((np.diff(clock) >= 0).all()), "the times of its trajectory do not rise from 0")
         require(bool(clock[-1] > 0), "it takes no time")
+        bound = table.get("lower_bound")
+        require(bound is None or isinstance(bound, dict), "its `lower_bound` is no table")
+        least = None if bound is None else float(_numbers(bound, "cost", "`lower_bound`"))
     except (OSError, ValueError, RecursionError) as error:
         reason = f"it is no JSON text, {error}"
         if isinstance(error, OSError):
@@ -313,7 +316,7 @@ def load_path(file: str | File) -> Path:
         raise InputError(f"the path file {file} cannot be read: {reason}; write it with `query -o`") from None
     departure = float(_numbers(table, "departure_s", "the path")) if "departure_s" in table else None
     frozen = table.get("frozen") is True
-    return Path(legs[0].start, legs[-1].end, cost, legs, departure=departure, frozen=frozen)
+    return Path(legs[0].start, legs[-1].end, cost, legs, least=least, departure=departure, frozen=frozen)
 
 
 def _read_leg(leg: Any, where: str) -> Leg:

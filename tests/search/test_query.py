@@ -28,7 +28,7 @@ PAIRS = [
     ((190.0, -150.0, -149.0), (-150.0, -120.0, -3.0)),
     ((0.0, 0.0, 0.0), (1.0, 20.0, -40.0)),
 ]
-PATH_KEYS = {"found", "travel_time_s", "cost", "legs"}
+PATH_KEYS = {"found", "travel_time_s", "cost", "legs", "lower_bound"}
 LEG_KEYS = {"from", "to", "glide_angle_rad", "heading_rad", "speed_mps", "depart_s", "duration_s", "miss_m"}
 LEG_KEYS |= {"trajectory"}
 
