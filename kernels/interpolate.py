@@ -38,7 +38,7 @@ def _shuffled(builder, vector, lanes):
 
 
 def _lerp(builder, low, high, weight):
-    """low + weight (high - low), the last step fused."""
+    """Return low + weight (high - low); the last multiplication and addition are one fused step."""
     kind = low.type
     name, signature = f"llvm.fma.v{kind.count}f64", ir.FunctionType(kind, [kind] * 3)
     fma = cgutils.get_or_insert_function(builder.module, signature, name)

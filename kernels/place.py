@@ -13,7 +13,7 @@ class Place(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """A velocity through water [m/s], where it is no control's."""
+    """A velocity through water [m/s] that does not belong to a control."""
 
     u: float
     v: float

@@ -1,4 +1,4 @@
-"""Reach: the exact legs between points and the nodes under their fans; guesses polished, the cheapest kept."""
+"""Reach: finds the exact legs between points and the nodes under their fans, and keeps the cheapest of each."""
 
 import math
 from typing import NamedTuple
@@ -188,7 +188,7 @@ def in_turn(polar, position, points, tasks, guesses):
 
 @kernel
 def _aim_at(medium, position, points, tasks, guess, lanes, n):
-    """Aim lane n by a first guess."""
+    """Start lane n with the control of a first guess."""
     task = tasks[int(guess[GUESS_TASK])]
     start = place_of(points, int(task[TASK_ORIGIN]))
     x, y, z = position[int(guess[GUESS_NODE])]
@@ -223,7 +223,7 @@ def _keep_cheaper(medium, lanes, n, deadline, edge):
 
 @kernel
 def _is_worth_trying(cost, turns, g, at, rows, edge):
-    """Whether the guess at a place of the order may still better the edge of pair g."""
+    """Return whether the guess at a place of the order may still improve the edge of pair g."""
     if at >= turns.begin[g + 1] or at - turns.begin[g] >= MAX_TRIES:
         return False
     guess = turns.order[at]
@@ -388,7 +388,7 @@ def first_tasks(medium, bins, points, limit, first, last):
 
 @kernel
 def deepest_asked(nodes, points, n, upward):
-    """The height [m] of the highest node, or the lowest, that a point asks for; inf where it asks for all."""
+    """Return the height [m] of the highest, or lowest, node that a point asks for; inf if it asks for all."""
     if points.indptr.size == 0:
         return math.inf if upward else -math.inf
     furthest = points.position[n, 2]
@@ -400,7 +400,7 @@ def deepest_asked(nodes, points, n, upward):
 
 @kernel
 def want(wanted, points, n, value):
-    """Let the nodes that point n asks for be wanted, or no more; nothing where it asks for all."""
+    """Mark the nodes that point n asks for as wanted, or remove the marks; nothing if it asks for all nodes."""
     if points.indptr.size > 0:
         for k in range(points.indptr[n], points.indptr[n + 1]):
             wanted[points.target[k]] = value
@@ -408,7 +408,7 @@ def want(wanted, points, n, value):
 
 @inlined
 def guesses_of_tasks(medium, steering, nodes, points, tasks, settled, lanes):
-    """First guesses for the tasks that are not done, but for the nodes that are settled."""
+    """Find first guesses for the tasks that are not done, except for nodes whose legs are final."""
     guesses = Guesses(np.empty((1024, GUESS_COLUMNS)), 0)
     begin = 0
     for n in range(tasks.shape[0]):

@@ -1,4 +1,4 @@
-"""The stream value of a pair: how much flow crosses the straight line between its ends."""
+"""The stream value of a pair: the amount of flow that crosses the straight line between its ends."""
 
 import math
 
