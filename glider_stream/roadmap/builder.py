@@ -16,7 +16,7 @@ from ..base.threads import threads
 from ..kernels.edges import STATUS, TIME, Status
 from .evaluator import NODES_AT_ONCE
 from .follow import Follower
-from .pairs import Found, Legs
+from .pairs import Found, LegFinder
 from .problem import Problem
 from .provenance import lonlat_of, provenance_of
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
@@ -99,13 +99,13 @@ def find_edges(
         yield _evaluated(legs, some, when, None if wanted is None else wanted(some))
 
 
-def nodes_of_batch(problem: Problem, legs: Legs, batch_pairs: int) -> int:
+def nodes_of_batch(problem: Problem, legs: LegFinder, batch_pairs: int) -> int:
     """Return the number of nodes with about `batch_pairs` pairs; with many departures enough for all threads."""
     nodes, slices = max(1, batch_pairs // legs.pairs_per_node), len(problem.departures)
     return max(nodes // slices, min(nodes, SPANS * NODES_AT_ONCE * threads_now()))
 
 
-def _evaluated(legs: Legs, source: Index, departure: Array | None, wanted: Bools | None) -> Edges:
+def _evaluated(legs: LegFinder, source: Index, departure: Array | None, wanted: Bools | None) -> Edges:
     began = time.perf_counter()
     batch = legs.of(source, departure, wanted)
     return _edges(source, batch, time.perf_counter() - began)

@@ -31,7 +31,7 @@ class Attached:
     outcomes: Array
 
 
-class Legs(Protocol):
+class LegFinder(Protocol):
     """Finds legs between the nodes of a roadmap, and between nodes and other points."""
 
     @property
@@ -61,7 +61,7 @@ class Legs(Protocol):
 
 def legs_of(
     law: NeighbourLaw | Reachable, evaluator: Evaluator, position: Array, volume: float, departure: float
-) -> Legs:
+) -> LegFinder:
     """Return the object that finds legs by a law and a method among nodes (n, 3) [m] in a `volume` [m^3]."""
     if isinstance(law, Reachable):
         return ReachableLegs(evaluator, position, departure, law.limit)

@@ -13,7 +13,7 @@ from ..water.domain import BoxDomain, GeographicDomain
 from .evaluator import Evaluator
 from .neighbours import NeighbourLaw, Reachable
 from .nodes import Sampler
-from .pairs import Legs, legs_of
+from .pairs import LegFinder, legs_of
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Problem:
         where = "on land, in a keep-out area or too near the seabed" if inside else "outside the flow"
         require(False, f"`{name}` = {text} lies {where}; move it into open water")
 
-    def legs(self, position: Array) -> Legs:
+    def legs(self, position: Array) -> LegFinder:
         """Return the object that finds legs among nodes (n, 3) [m]."""
         volume = float(np.prod(self.hi - self.lo))
         return legs_of(self.law, self.evaluator, position, volume, self.departure)

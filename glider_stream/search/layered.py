@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Array, Index
 from ..kernels.edges import GLIDE_ANGLE, STATUS, TIME, Status
-from ..roadmap.pairs import Attached, Legs
+from ..roadmap.pairs import Attached, LegFinder
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
 from .path import SURFACE
@@ -65,7 +65,7 @@ class SurfacingPlanner(Planner):
         """Return the nodes' positions (n, 3) [m], and the earliest time (n,) [s] of any of their states."""
         return self.base.position, self.arrivals(start).reshape(-1, len(self.base.position)).min(axis=0)
 
-    def _on_base(self) -> Legs:
+    def _on_base(self) -> LegFinder:
         return self.problem.legs(self.base.position)
 
 

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Index
 from ..kernels.edges import COST, GLIDE_ANGLE, STATUS, TIME, Edge, Status, edge_of
-from ..roadmap.pairs import Attached, Legs
+from ..roadmap.pairs import Attached, LegFinder
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
@@ -191,7 +191,7 @@ class Planner(RoutePlanner):
         return float(search.blend.of(leg.cost, leg.time)) + turn
 
     @cached_property
-    def _legs(self) -> Legs:
+    def _legs(self) -> LegFinder:
         return self.problem.legs(self.roadmap.position)
 
     def _start(self, point: ArrayLike | None) -> End:
