@@ -12,6 +12,8 @@ from glider_stream.evaluation.level_set import Bound, Front, Waters, bound, dime
 from glider_stream.scenario import scenario_from_text
 from glider_stream.water.analytic import Uniform
 
+pytestmark = pytest.mark.slow
+
 HEIGHTS = (-150.0, 0.0)
 
 

@@ -12,6 +12,8 @@ from glider_stream.jobs import cluster
 from glider_stream.roadmap.store import read_any_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario
 
+pytestmark = pytest.mark.slow
+
 BATCH = 3000
 
 

@@ -19,6 +19,8 @@ from helpers.small import strict_json
 from glider_stream import plot
 from glider_stream.plot.page import page_text
 
+pytestmark = pytest.mark.slow
+
 TITLE = """</title></script><script>document.title = "broken"</script> & 'sea' <!-- {{js}}"""
 PLACES = {"LAND": (27e3, -24e3), "SEA": (-10e3, -25e3), "SHALLOW": (18e3, -24e3)}
 DRIVER = Path(__file__).with_name("page_driver.js")

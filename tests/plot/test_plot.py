@@ -20,6 +20,8 @@ from glider_stream.roadmap.builder import node_positions
 from glider_stream.scenario import scenario_from_table
 from glider_stream.search.path import Path
 
+pytestmark = pytest.mark.slow
+
 UNIT = re.compile(r"\((m|km|s|min|h|days|m/s|°|degrees|count)\)")
 SIGNATURES = {".png": b"\x89PNG\r\n\x1a\n", ".svg": b"<?xml", ".pdf": b"%PDF-"}
 
@@ -100,7 +102,6 @@ def written(figure):
     return [(text.get_text(), text.get_window_extent()) for text in shown]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_no_label_covers_another_or_leaves_the_page(figures, name):
     texts = written(figures[name])

@@ -93,16 +93,19 @@ def check_against_literal(judge, position, departure, least):
 # the fast path changes no result
 
 
+@pytest.mark.slow
 @both_methods
 def test_equals_the_literal_loop_in_vortices(evaluator, vortices, method):
     check_against_literal(evaluator(vortices, method), nodes(60, seed=0), 0.0, least=20)
 
 
+@pytest.mark.slow
 @both_methods
 def test_equals_the_literal_loop_in_the_plane(evaluator, planar, method):
     check_against_literal(evaluator(planar, method, candidates=9), nodes(60, seed=1), 0.0, least=20)
 
 
+@pytest.mark.slow
 @both_methods
 def test_equals_the_literal_loop_on_a_grid_that_paths_leave(evaluator, sampled, method):
     check_against_literal(
@@ -339,6 +342,7 @@ def seabed(bottom):
     return Seabed(height, 5.0, ends, 1 / 600, 1 / 600, -300.0, -300.0, height)
 
 
+@pytest.mark.slow
 def test_land_and_seabed_block(evaluator, vortices):
     position = nodes(40, seed=8)
     asked = (position, 0.0, *all_pairs(40))

@@ -22,6 +22,8 @@ from glider_stream.roadmap.store import read_any_roadmap, read_roadmap, write_ro
 from glider_stream.roadmap.verify import check_slices, replayed_misses
 from glider_stream.scenario import read_scenario
 
+pytestmark = pytest.mark.slow
+
 
 def fresh(number):
     """The roadmap of one departure, all legs found by fans."""

@@ -12,6 +12,8 @@ from glider_stream.scenario import read_scenario
 from glider_stream.search import time_dependent
 from glider_stream.search.time_dependent import ClockPlanner
 
+pytestmark = pytest.mark.slow
+
 FEW = ["flow.period=900.0", "sampling.shape=[4, 2, 3]", "query.goal=[1000.0, 500.0, -250.0]"]
 ENERGY = ["cost.kind=energy", "cost.preset=slocum", "cost.hotel=0.9"]
 TOLD = "later than at the soonest were followed"

@@ -22,6 +22,8 @@ from glider_stream.search.query import Planner
 from glider_stream.search.refine import Asked, Refiner, refined
 from glider_stream.search.time_dependent import ClockPlanner
 
+pytestmark = pytest.mark.slow
+
 NOWHERE_ELSE = (None, None)
 TWO_ROUNDS = Asked(within=0.5)
 

@@ -20,6 +20,8 @@ from glider_stream.search.sliced import SliceSearch
 from glider_stream.search.surfacing import Surfacing
 from glider_stream.search.time_dependent import ClockPlanner
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def search():

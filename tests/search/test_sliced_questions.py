@@ -19,6 +19,8 @@ from glider_stream.search.path import load_path
 from glider_stream.search.sliced import SliceSearch
 from glider_stream.search.time_dependent import ClockPlanner
 
+pytestmark = pytest.mark.slow
+
 BY_SLICES = "slices and truth differ by"
 
 

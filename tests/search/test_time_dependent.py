@@ -26,6 +26,8 @@ from glider_stream.search.thin import thin
 from glider_stream.search.time_dependent import ClockPlanner
 from glider_stream.water.ocean.flow import slots
 
+pytestmark = pytest.mark.slow
+
 GYRE = ["flow.period=900.0", "sampling.shape=[8, 4, 3]"]
 FLOWS = {
     "reachable": GYRE,
@@ -73,7 +75,6 @@ def flown(flow, path):
     return np.array(places)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", FLOWS)
 def test_what_is_exported_flies_from_end_to_end(name, tmp_path):
     planner = clock([*FLOWS[name], "query.departure=200.0"])
@@ -223,7 +224,6 @@ def test_the_front_of_time_and_energy_is_exact(flow):
     assert "the least that one takes is" in none.why
 
 
-@pytest.mark.slow
 def test_rules_of_surfacing_hold_with_the_clock_running(gyre):
     ends = gyre.position[-2], gyre.position[-1]
     free = gyre.query(*ends)
@@ -247,27 +247,26 @@ def test_fewer_legs_are_found_at_their_own_times(gyre):
     assert np.linalg.norm(places - [leg.end for leg in fewer.legs], axis=1).max() < 0.1
 
 
-@pytest.mark.slow
 def test_when_to_leave(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     opened = open_scenario("swinging-gyre", GYRE)
-    found = opened.when_to_leave((0.0, 600.0), every=150.0, figure="leave.png")
-    assert [path.departure for path in found.paths] == [0.0, 150.0, 300.0, 450.0, 600.0]
+    found = opened.when_to_leave((0.0, 300.0), every=150.0, figure="leave.png")
+    assert [path.departure for path in found.paths] == [0.0, 150.0, 300.0]
     assert found.best.travel_time == min(path.travel_time for path in found.paths)
     for path in found.paths[1:3]:
         again = clock([*GYRE, f"query.departure={path.departure}"]).query()
         assert again.travel_time == pytest.approx(path.travel_time, abs=0.05)
         assert np.linalg.norm(flown(opened.problem.evaluator.flow, path.as_dict())[-1] - path.goal) < 0.1
     by = found.paths[2].departure + found.paths[2].travel_time + 1.0
-    late = opened.when_to_leave((0.0, 600.0), every=150.0, arrive_by=by)
-    assert late.latest.departure >= 300.0
+    late = opened.when_to_leave((0.0, 300.0), every=150.0, arrive_by=by)
+    assert late.latest.departure == 300.0
     assert late.latest.departure + late.latest.travel_time <= by
     sets = [part for one in GYRE for part in ("--set", one)]
     asked = "--depart-between", "0", "300", "--every", "150", "--json"
     asked = command(capsys, "plan", "swinging-gyre", *sets, *asked)
     rows = strict_json(asked.out)
     assert [row["departure_s"] for row in rows["departures"]] == [0.0, 150.0, 300.0]
-    assert rows["best"]["travel_time_s"] == pytest.approx(min(p.travel_time for p in found.paths[:3]), abs=0.05)
+    assert rows["best"]["travel_time_s"] == pytest.approx(found.best.travel_time, abs=0.05)
     none = command(capsys, "plan", "swinging-gyre", *sets, "--arrive-by", "60", "--every", "60")
     assert none.code == 1
     assert "none of these arrives in time" in none.err

@@ -14,6 +14,8 @@ from glider_stream.kernels.flow import velocity
 from glider_stream.water.frame import LocalFrame
 from glider_stream.water.ocean import divergence_ratio, ocean_flow, read_currents, sample
 
+pytestmark = pytest.mark.slow
+
 xr = pytest.importorskip("xarray")
 pyproj = pytest.importorskip("pyproj")
 
@@ -560,7 +562,6 @@ def test_a_user_may_say(tmp_path, make, names):
     )
 
 
-@pytest.mark.slow
 def test_describe_takes_a_users_word(tmp_path):
     path = written(tmp_path, plain())
     program = [sys.executable, "-c", "from glider_stream.cli import main; main()"]

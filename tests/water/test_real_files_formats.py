@@ -18,6 +18,8 @@ from glider_stream.water.ocean import ocean_flow, read_currents, sample
 from glider_stream.water.ocean.grid import CurvedGrid, gaps
 from glider_stream.water.ocean.units import in_metres_per_second
 
+pytestmark = pytest.mark.slow
+
 xr = pytest.importorskip("xarray")
 
 HOURS = np.array([0.0, 24.0, 48.0])
@@ -484,7 +486,6 @@ def test_other_formats_name_the_tool_that_converts_them(tmp_path, name):
         read_currents(tmp_path / "all.zip")
 
 
-@pytest.mark.slow
 def test_an_error_of_our_own_is_not_reported_as_damage(tmp_path):
     """Exit code 3, one line, and the trace where it is asked for; a truncated file is still exit code 2."""
     path = written(tmp_path, dataset())

@@ -12,6 +12,8 @@ from glider_stream.water.frame import LocalFrame
 from glider_stream.water.ocean import grib, opening, read_currents, sample
 from glider_stream.water.ocean.bathymetry import read_bathymetry
 
+pytestmark = pytest.mark.slow
+
 xr = pytest.importorskip("xarray")
 
 PLACE = (20.45, 60.45, 20.0)

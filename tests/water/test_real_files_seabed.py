@@ -10,6 +10,8 @@ from glider_stream.water.describe import describe
 from glider_stream.water.frame import LocalFrame
 from glider_stream.water.ocean import OceanFlow, ocean_flow, read_currents, sample
 
+pytestmark = pytest.mark.slow
+
 xr = pytest.importorskip("xarray")
 
 FRAME = LocalFrame.over(*DOMAIN)
