@@ -64,6 +64,11 @@ def least(way: np.ndarray, fastest: float) -> float:
     return (-b + math.sqrt(b * b + a * float(way @ way))) / a
 
 
+def percent(share: float) -> float | None:
+    """A share in percent; None where one of the ways has no route."""
+    return round(100 * float(share), 2) if math.isfinite(share) else None
+
+
 def row(per_leg: float, jitter: bool) -> dict[str, Any]:
     """One roadmap, all ways in it."""
     problem = scenario_from_text(SCENARIO.format(per_leg=per_leg, jitter=str(jitter).lower())).problem()
@@ -84,8 +89,8 @@ def row(per_leg: float, jitter: bool) -> dict[str, Any]:
         "nodes": len(road.position),
         "spacing_legs": round(dense.legs, 3),
         "directions": round(dense.directions, 1),
-        **{f"lost_{name}_percent": round(100 * float(np.mean(some)), 2) for name, some in lost.items()},
-        **{f"worst_{name}_percent": round(100 * max(some), 2) for name, some in lost.items()},
+        **{f"lost_{name}_percent": percent(sum(some) / len(some)) for name, some in lost.items()},
+        **{f"worst_{name}_percent": percent(max(some)) for name, some in lost.items()},
         "build_s": round(built, 1),
     }
 

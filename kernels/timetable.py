@@ -1,6 +1,7 @@
 """Timetables: the earliest arrivals over legs whose times are known at some departures, and between them."""
 
 import math
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 
@@ -35,45 +36,6 @@ def corrected(when, early, time_early, late, time_late, learnt, times, first, la
     return time_between(when, early, time_early, late, time_late)
 
 
-@kernel
-def _sooner(key, a, b):
-    """Return whether node a comes before node b: by time, then by number."""
-    return key[a] < key[b] or (key[a] == key[b] and a < b)
-
-
-@kernel
-def _rise(heap, place, key, at):
-    """Move the node at a place of the heap up to its right place."""
-    node = heap[at]
-    while at > 0:
-        above = (at - 1) // 2
-        if not _sooner(key, node, heap[above]):
-            break
-        heap[at] = heap[above]
-        place[heap[at]] = at
-        at = above
-    heap[at] = node
-    place[node] = at
-
-
-@kernel
-def _sink(heap, place, key, size):
-    """Move the node at the top of the heap down to its right place."""
-    node = heap[0]
-    at = 0
-    while 2 * at + 1 < size:
-        below = 2 * at + 1
-        if below + 1 < size and _sooner(key, heap[below + 1], heap[below]):
-            below += 1
-        if not _sooner(key, heap[below], node):
-            break
-        heap[at] = heap[below]
-        place[heap[at]] = at
-        at = below
-    heap[at] = node
-    place[node] = at
-
-
 @entry_point(nogil=True)
 def earliest_arrivals(
     departures, indptr, target, time, learnt_first, learnt_target, learnt, learnt_time, goal, least, latest,
@@ -89,21 +51,15 @@ def earliest_arrivals(
     the node `goal`, at none where it is -1. Exact where who leaves earlier does not arrive later.
     """
     nodes, slices = arrival.size, departures.size
-    heap, place = np.empty(nodes, np.int64), np.full(nodes, -1, np.int64)
-    key = arrival + least
-    size = 0
-    for n in range(nodes):
-        if key[n] < math.inf:
-            heap[size] = n
-            _rise(heap, place, key, size)
-            size += 1
-    while size > 0:
-        node = heap[0]
-        size -= 1
-        if size > 0:
-            heap[0] = heap[size]
-            _sink(heap, place, key, size)
-        place[node] = -2
+    # the nodes to look at next, soonest first; of equal ones the lower number
+    waiting = [(arrival[n] + least[n], n) for n in range(nodes) if arrival[n] + least[n] < math.inf]
+    heapify(waiting)
+    settled = np.zeros(nodes, np.bool_)
+    while len(waiting) > 0:
+        node = heappop(waiting)[1]
+        if settled[node]:
+            continue
+        settled[node] = True
         if node == goal:
             break
         when = arrival[node]
@@ -121,7 +77,7 @@ def earliest_arrivals(
             if b < b_last and target[b] == to:
                 time_late = time[b]
                 b += 1
-            if place[to] == -2:
+            if settled[to]:
                 continue
             first, last = learnt_first[node], learnt_first[node + 1]
             while first < last and learnt_target[first] != to:
@@ -132,8 +88,4 @@ def earliest_arrivals(
             takes = corrected(when_there, early, time_early, late, time_late, learnt, learnt_time, first, end)
             if when + takes < arrival[to] and when + takes + least[to] <= latest:
                 arrival[to], before[to] = when + takes, node
-                key[to] = when + takes + least[to]
-                if place[to] < 0:
-                    heap[size], place[to] = to, size
-                    size += 1
-                _rise(heap, place, key, place[to])
+                heappush(waiting, (when + takes + least[to], to))

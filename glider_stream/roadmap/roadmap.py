@@ -144,23 +144,8 @@ EMPTY = (
 
 
 @dataclass(frozen=True)
-class Roadmap:
-    """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
-
-    `indptr` (n + 1,) and `target` (edges,), which rises within a row. Each edge has `time` [s], `cost`,
-    `glide_angle` (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts` are the numbers
-    of pairs by status, and `node_counts` (n, statuses) those of each node, if the file has them. `file` is the
-    file from which it was read. `elsewhere` holds section.key=FILE for each file of the scenario for which the
-    user gave a new place.
-
-    Examples:
-        >>> roadmap = glider_stream.read_roadmap("small.h5")
-        >>> roadmap.position.shape, roadmap.target.size
-        ((77, 3), 929)
-        >>> first = slice(roadmap.indptr[0], roadmap.indptr[1])
-        >>> len(roadmap.target[first]) == len(roadmap.time[first])
-        True
-    """
+class EdgeTable:
+    """Nodes, and edges in CSR form: what roadmaps of one departure and of several have in common."""
 
     position: Array
     indptr: Index
@@ -176,7 +161,6 @@ class Roadmap:
     wall_s: float
     threads: int
     lonlat: Array | None = None
-    node_counts: NDArray[np.int32] | None = None
     file: Path | None = field(default=None, compare=False)
     elsewhere: tuple[str, ...] = field(default=(), compare=False)
 
@@ -209,11 +193,15 @@ class Roadmap:
             **asdict(self.provenance),
         }
 
+    def _sizes(self) -> str:
+        """Return how much the roadmap holds, for the first line of its text."""
+        return f"{len(self.position):,} nodes, {self.target.size:,} edges"
+
     def __str__(self) -> str:
         others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
         steps = f"  steps:  {self.provenance.steps}\n" if self.provenance.steps else ""
         return (
-            f"Roadmap: {len(self.position):,} nodes, {self.target.size:,} edges\n"
+            f"Roadmap: {self._sizes()}\n"
             f"  pairs:  {self.evaluated:,} evaluated, {self.connected_share:.1%} connected ({others})\n"
             f"  flow:   {self.provenance.flow}\n"
             f"  glider: {self.provenance.glider}\n{steps}"
@@ -222,3 +210,25 @@ class Roadmap:
             f"  by:     glider-stream {self.provenance.software_version}"
             + "".join(f", {text}" for text in (self.provenance.libraries, self.provenance.machine) if text)
         )
+
+
+@dataclass(frozen=True)
+class Roadmap(EdgeTable):
+    """Nodes `position` (n, 3) [m] and edges in CSR form by source node.
+
+    `indptr` (n + 1,) and `target` (edges,), which rises within a row. Each edge has `time` [s], `cost`,
+    `glide_angle` (signed) and `heading` [rad], `speed` through water [m/s], `miss` [m]. `counts` are the numbers
+    of pairs by status, and `node_counts` (n, statuses) those of each node, if the file has them. `file` is the
+    file from which it was read. `elsewhere` holds section.key=FILE for each file of the scenario for which the
+    user gave a new place.
+
+    Examples:
+        >>> roadmap = glider_stream.read_roadmap("small.h5")
+        >>> roadmap.position.shape, roadmap.target.size
+        ((77, 3), 929)
+        >>> first = slice(roadmap.indptr[0], roadmap.indptr[1])
+        >>> len(roadmap.target[first]) == len(roadmap.time[first])
+        True
+    """
+
+    node_counts: NDArray[np.int32] | None = field(default=None, kw_only=True)

@@ -1,7 +1,6 @@
 """The roadmap of many departures: slices of edges over the same nodes."""
 
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
 from ..base.settings import require
-from .roadmap import EDGE_FIELDS, Provenance, Roadmap
+from .roadmap import EDGE_FIELDS, EdgeTable, Roadmap
 
 
 def rows_of(nodes: Index, slices: int) -> Index:
@@ -18,7 +17,7 @@ def rows_of(nodes: Index, slices: int) -> Index:
 
 
 @dataclass(frozen=True)
-class SlicedRoadmap:
+class SlicedRoadmap(EdgeTable):
     """Nodes `position` (n, 3) [m], and edges at each of the rising `departures` (slices,) [s].
 
     The fields are those of `Roadmap`. But `indptr` (n slices + 1,) has a row for each node and departure, in the
@@ -31,29 +30,8 @@ class SlicedRoadmap:
         ([0.0, 600.0], 26)
     """
 
-    departures: Array
-    position: Array
-    indptr: Index
-    target: NDArray[np.int32]
-    time: Array
-    cost: Array
-    glide_angle: Array
-    heading: Array
-    speed: Array
-    miss: Array
-    counts: dict[str, int]
-    provenance: Provenance
-    wall_s: float
-    threads: int
-    lonlat: Array | None = None
-    row_counts: NDArray[np.int32] | None = None
-    file: Path | None = field(default=None, compare=False)
-    elsewhere: tuple[str, ...] = field(default=(), compare=False)
-
-    @property
-    def evaluated(self) -> int:
-        """The number of pairs that were evaluated."""
-        return sum(self.counts.values())
+    departures: Array = field(kw_only=True)
+    row_counts: NDArray[np.int32] | None = field(default=None, kw_only=True)
 
     def at(self, number: int) -> Roadmap:
         """Return one slice as a roadmap."""
@@ -85,30 +63,12 @@ class SlicedRoadmap:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the table that `info --json` prints."""
-        return {
-            "nodes": len(self.position),
-            "departures": self.departures.tolist(),
-            "edges": self.target.size,
-            "evaluated": self.evaluated,
-            "connected_share": self.target.size / max(self.evaluated, 1),
-            "counts": self.counts,
-            "pairs_per_s": self.evaluated / max(self.wall_s, 1e-9),
-            "wall_s": self.wall_s,
-            "threads": self.threads,
-            **asdict(self.provenance),
-        }
+        return {"departures": self.departures.tolist(), **super().as_dict()}
 
-    def __str__(self) -> str:
-        others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
+    def _sizes(self) -> str:
         degree = np.diff(self.indptr).reshape(-1, self.departures.size).sum(axis=0)
         return (
-            f"Roadmap: {len(self.position):,} nodes, {self.departures.size} departures from "
+            f"{len(self.position):,} nodes, {self.departures.size} departures from "
             f"{self.departures[0]:,.0f} s to {self.departures[-1]:,.0f} s, {self.target.size:,} edges, "
-            f"{degree.min():,} to {degree.max():,} at a departure\n"
-            f"  pairs:  {self.evaluated:,} evaluated ({others})\n"
-            f"  flow:   {self.provenance.flow}\n"
-            f"  glider: {self.provenance.glider}\n"
-            f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.provenance.created}\n"
-            f"  by:     glider-stream {self.provenance.software_version}"
-            + "".join(f", {text}" for text in (self.provenance.libraries, self.provenance.machine) if text)
+            f"{degree.min():,} to {degree.max():,} at a departure"
         )

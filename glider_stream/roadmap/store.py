@@ -277,7 +277,7 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
         by_row = arrays.get("pairs/by_node")
         if departures is None:
             return Roadmap(**whole, node_counts=by_row)
-        return SlicedRoadmap(departures, **whole, row_counts=by_row)
+        return SlicedRoadmap(**whole, departures=departures, row_counts=by_row)
     raise AssertionError  # never reached, because _reading raises
 
 
