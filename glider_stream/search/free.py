@@ -13,12 +13,23 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from .glides import ANGLE, HEADING, STEPS, Z_END, Air, Glides, Slopes, Z
-from .polish import ROOM, Chain, Polisher
+from .polish import ROOM, Chain, Effort, Polisher
 
 POINTS = 64
 """The polar is read at this many glide angles from its fastest to its steepest, in each direction."""
 LONGEST_CHANGE = 0.3
 """A Newton step changes the duration of a leg at most by this share."""
+TINY = 1e-6
+"""The least duration [s] of a part of a leg."""
+MOVES = Effort(moves=8, barriers=1)
+"""How long a route is polished before its stops are spread evenly again."""
+ROUNDS = 4
+"""Its stops are spread so many times, less one. They gather where the first route turned, and there the way of
+the route changes slowly."""
+SPREADS = (1.0, 0.5, 0.25)
+"""If the stops cannot be spread evenly, a share of that is tried."""
+SLIGHT = 3e-4
+"""No more rounds are made after one that gains a smaller share of the cost."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +75,13 @@ class FreeAir(Air):
         level = np.interp(vertical, *self.speeds)
         return np.stack([level * np.cos(heading), level * np.sin(heading), vertical], axis=-1), time
 
+    def along(self, begin: Array, end: Array, glides: Glides, share: float | Array) -> Array:
+        """Return the positions (n, 3) [m] of legs after a share of their duration, one for all or (n,)."""
+        height = begin[:, 2] + share * (end[:, 2] - begin[:, 2])
+        time = np.maximum(glides.angle * share, TINY)
+        of = np.column_stack([begin, glides.departs, height, time, glides.heading])
+        return np.column_stack([self._ends(of[None])[0], height])
+
     def drift(self, begin: Array, end: Array, glides: Glides) -> Array:
         """Return the mean current (n, 2) [m/s] of legs: what the glide does not explain of a leg's way."""
         through, time = self._flights(self._rows(begin, end, glides))
@@ -89,6 +107,32 @@ class FreePolisher(Polisher):
         stops = polisher.air.along(begin, end, many, part)
         stops[part == 1.0] = chain.stops[1:]
         return self.chain(np.vstack([chain.stops[:1], stops]), np.repeat(time / counts, counts), many.heading)
+
+    def best(self, chain: Chain) -> Chain:
+        """Return the polished route."""
+        for _ in range(ROUNDS - 1):
+            before, chain = chain.cost, self.polish(chain, MOVES)
+            spread = self._spread(chain) if before - chain.cost > SLIGHT * chain.cost else None
+            if spread is None:
+                return chain
+            chain = spread
+        return self.polish(chain, MOVES)
+
+    def _spread(self, chain: Chain) -> Chain | None:
+        """Return the route with stops at more even times; None if that cannot be flown."""
+        time, heading = chain.glides.time, np.unwrap(chain.glides.heading)
+        clock = np.concatenate([[0.0], np.cumsum(time)])
+        for share in SPREADS:
+            at = clock + share * (np.linspace(0.0, clock[-1], len(clock)) - clock)
+            leg = np.clip(np.searchsorted(clock, at, side="right") - 1, 0, len(time) - 1)
+            of = Glides(*(values[leg] for values in chain.glides))
+            stops = self.air.along(chain.stops[leg], chain.stops[leg + 1], of, (at - clock[leg]) / time[leg])
+            stops[[0, -1]] = chain.stops[[0, -1]]
+            middle = 0.5 * (clock[1:] + clock[:-1])
+            found = self.chain(stops, np.diff(at), np.interp(0.5 * (at[1:] + at[:-1]), middle, heading))
+            if found is not None:
+                return found
+        return None
 
     def _flips(self, stops: Array, before: Array) -> NDArray[np.bool_]:
         return np.zeros(len(stops) - 1, np.bool_)

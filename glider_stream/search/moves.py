@@ -26,13 +26,11 @@ TRIAL = Effort(moves=6)
 """How long a route is polished that is only tried."""
 ROUGH = Effort(moves=15, enough=1e-4, barriers=1)
 """How long a route is polished that is changed afterwards."""
-FREE = Effort(barriers=1)
-"""How long a route is polished that may hold its depth."""
 PIECES = 16
 """A route that may hold its depth has about this many legs; with more the search ends in worse places."""
-HEIGHTS = (1.3, 2.0)
-"""Small yos are this many times as high as the least change of depth; the second is for routes that cannot be
-flown with the first."""
+HEIGHTS = (1.3, 1.5, 1.8)
+"""Small yos are this many times as high as the least change of depth; the later ones are for routes that cannot
+be flown with the first."""
 YO_PAYS = 1e-3
 """A yo must gain this share of the cost."""
 PAYS = 1e-5
@@ -69,7 +67,7 @@ def _with_small_yos(polisher: Polisher, chain: Chain) -> Chain | None:
     way = free.from_route(polisher, chain, max(PIECES, len(chain.glides.time)))
     if way is None:
         return None
-    way = free.polish(way, FREE)
+    way = free.best(way)
     for height in HEIGHTS:
         found = with_yos(polisher, free, way, height * polisher.least_rise)
         if found is not None:
