@@ -329,6 +329,7 @@ def plan(scenario: str, overrides: tuple[str, ...], **options: Any) -> None:
     show_default=True,
     help="The old list is good while flying it on costs at most this much more in all.",
 )
+@click.option("--all-nodes", is_flag=True, help="Search all nodes, not only those near the roadmap's best ways.")
 @click.option("--polish", is_flag=True, help="Polish the new plan, as in `query`.")
 @click.option("--thin", type=float, metavar="METRES", help="Join legs of the new plan, as in `query`.")
 @click.option("--most-yos", type=int, help="The rule of surfacing, if not the old plan's.")

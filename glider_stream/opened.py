@@ -46,8 +46,10 @@ from .search.departures import Departures, Moment, seconds, when_to_leave
 from .search.flown_on import check_plan, flown_on, located
 from .search.least_time import GreatestSpeeds, least_cost
 from .search.path import SURFACE, Origin, Path, load_path
+from .search.query import Planner
 from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
+from .search.time_dependent import ClockPlanner
 from .search.trade_off import TradeOff
 from .search.why_not import no_edges
 from .vehicle.polar import polar
@@ -58,6 +60,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+NEAR = 0.1
+"""A replan with the clock running searches the nodes on ways at most this share longer than the best way, by the
+legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands."""
 
 
 def split_outputs(outputs: Sequence[str | File], refines: bool) -> tuple[list[str | File], list[str | File]]:
@@ -249,21 +254,24 @@ class OpenedScenario:
         tolerance: float = TOLERANCE,
         surfacing: Surfacing | None = None,
         arrival_radius: float | None = None,
+        all_nodes: bool = False,
         **options: Any,
     ) -> Replan:
         """Return a new plan from a position fix at the surface to the goal of an old plan, and what becomes of
         that.
 
-        `path`: the old plan, a path file or an object. `fix`: lon, lat [degrees], or x, y [m] where the domain is
-        in metres; `time`: when, in seconds of the flow, or an ISO 8601 text (UTC). `dac`: the depth-averaged
+        `path`: the old plan, a path file or an object. `fix`: lon, lat [degrees], or x, y [m] where the domain
+        is in metres; `time`: when, in seconds of the flow, or an ISO 8601 text (UTC). `dac`: the depth-averaged
         current of the last dive, east and north [m/s], which is compared with the forecast. `currents`: newer
         current files; the nodes are kept, and legs are found as the clock runs. The old list is good as long as
         flying it on, and planning anew after that, costs at most the share `tolerance` more than the new plan.
         `surfacing`: None stands for the old plan's rule. The goal counts as reached within `arrival_radius` [m].
-        `options` are those of `query` for a route and its files: outputs, polish, thin, within, seconds,
-        progress, window_hours, most_waypoints.
+        Where the clock runs and a roadmap has legs of one departure, only the nodes are searched that these legs
+        connect with a way at most NEAR longer than their best, unless `all_nodes`. `options` are those of
+        `query` for a route and its files: outputs, polish, thin, within, seconds, progress, window_hours,
+        most_waypoints.
 
-                Examples:
+        Examples:
             >>> path = road.query()
             >>> answer = road.replan(path, (-60.0, 60.0), 200.0)
             >>> answer.new.found, answer.flown.first
@@ -283,18 +291,54 @@ class OpenedScenario:
         check_moment(leaves, "fix", "name newer currents with --currents")
         leaves.check_point(place, "fix")
         planner = now._leaving(leaves.departure, _rule_of(old) if surfacing is None else surfacing)
+        wide, share = planner, 1.0
+        if not all_nodes:
+            planner, share = now._near_ways(planner, place, old.goal)
         radius = self._radius(old.goal, arrival_radius)
         arrived = float(np.linalg.norm(place - old.goal)) <= radius
         if arrival_radius is not None:
             options["arrival_radius"] = arrival_radius
-        new = now._route(planner, (place, place if arrived else old.goal), **options)
+        ends = place, place if arrived else old.goal
+        new = now._route(planner, ends, **options)
+        if share < 1 and not new.found:
+            planner, share = wide, 1.0
+            new = now._route(planner, ends, **options)
+        notes = new.notes
+        if share < 1:
+            among = (
+                f"searched among {share:.0%} of the nodes, those on ways of the roadmap's legs at most {NEAR:.0%}"
+            )
+            notes = (*notes, f"{among} longer than their best; --all-nodes searches all, which takes longer")
         old = located(old, Assembly(before.leaving(-since), frozen=False))
         flown = flown_on(old, since, place, leaves)
         current = None
         if dac is not None:
             current = compared(np.array(dac), old, since, place, (leaves, before), new, tolerance)
         good = None if arrived else good_until_of(flown, new, planner, radius, tolerance)
-        return Replan(new, old, since, place, flown, good, current, radius, arrived, leaves, new.notes)
+        return Replan(new, old, since, place, flown, good, current, radius, arrived, leaves, notes)
+
+    def _near_ways(self, planner: RoutePlanner, start: Array, goal: Array) -> tuple[RoutePlanner, float]:
+        """Return the planner among the nodes near the best ways by the legs of a roadmap, and their share.
+
+        It is the same planner, and 1, if its legs are known, or if no roadmap has legs of one departure.
+        """
+        guide = self._guide
+        if type(planner) is not ClockPlanner or guide is None:
+            return planner, 1.0
+        by_legs = guide._once("guide", Planner, lambda: Planner(_one_slice(guide.roadmap), guide.problem))
+        through = by_legs.arrivals(start) + by_legs.remaining(goal)
+        best = float(through.min(initial=np.inf))
+        if not np.isfinite(best):
+            return planner, 1.0
+        near = through <= (1 + NEAR) * best
+        nodes = np.ascontiguousarray(planner.position[near])
+        return ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen), float(near.mean())
+
+    @property
+    def _guide(self) -> "OpenedRoadmap | None":
+        """A roadmap of the same nodes, whose legs are of another time or another forecast; None without one."""
+        kept = self._kept.get("guide of nodes")
+        return kept if isinstance(kept, OpenedRoadmap) else None
 
     def _at_fix(self, old: Path, time: Moment) -> tuple[Problem, float]:
         """Return the problem for gliders that leave at a fix, and the time [s] since the departure of an old
@@ -342,9 +386,7 @@ class OpenedScenario:
         if before.departs is not None:
             query |= {"departure": 0.0, "epoch": before.departs.replace(tzinfo=None).isoformat()}
         later = OpenedScenario(with_currents(self.scenario, files, query), self.title)
-        later._kept["position"] = self.position
-        if self._file is not None:
-            later._kept["file"] = self._file
+        later._kept |= {"position": self.position, "file": self._file, "guide of nodes": self._guide}
         return later
 
     def _origin(self, planner: RoutePlanner) -> Origin:
@@ -607,6 +649,10 @@ class OpenedRoadmap(OpenedScenario):
         return self.roadmap.file
 
     @property
+    def _guide(self) -> "OpenedRoadmap | None":
+        return self
+
+    @property
     def position(self) -> Array:
         """The nodes (n, 3) [m]."""
         return self.roadmap.position
@@ -688,8 +734,13 @@ def open_plan(path: Path, overrides: Sequence[str] = ()) -> OpenedScenario:
         warnings.warn(f"{gone}; to use the roadmap, name it with --roadmap", InputWarning, stacklevel=2)
     opened = OpenedScenario(scenario_from_text(origin.scenario, overrides, "the plan's scenario"))
     if road is not None:
-        opened._kept["position"], opened._kept["file"] = road.position, road.roadmap.file
+        opened._kept |= {"position": road.position, "file": road.roadmap.file, "guide of nodes": road}
     return opened
+
+
+def _one_slice(road: Roadmap | SlicedRoadmap) -> Roadmap:
+    """Return a roadmap of one departure, the first of several."""
+    return road.at(0) if isinstance(road, SlicedRoadmap) else road
 
 
 def _rule_of(path: Path) -> Surfacing | None:

@@ -76,8 +76,8 @@ class CurrentCheck:
         )
         line = (
             f"current of the last dive [m/s]: {both}; it is compared, not put into the plan. If the difference "
-            f"stays, the vehicle is {self.by_next / 1000:.1f} km off at the next surfacing, and the way to the goal "
-            f"takes {abs(self.later):.0%} {'longer' if self.later > 0 else 'less'}"
+            f"stays, the vehicle is {self.by_next / 1000:.1f} km off at the next surfacing, and the way to the "
+            f"goal takes {abs(self.later):.0%} {'longer' if self.later > 0 else 'less'}"
         )
         if self.beyond:
             line += f": more than {self.tolerance:.0%}, so plan again at each surfacing, or take a newer forecast"
@@ -204,10 +204,10 @@ class Replan:
                 f"old list: not good even to the next surfacing: {good.beyond}; bring the new one now",
             ]
         until = f"{self._moment(good.last.since)}, {_place(self.shown(good.last.place), self.problem)}"
-        told = f"old list: if this call fails, it is good until {until}, the end of leg {good.last.legs}: a new plan "
-        told += (
-            f"from there costs {max(good.extra, 0.0):.1%} more in all, at most {good.tolerance:.0%} is allowed"
+        told = (
+            f"old list: if this call fails, it is good until {until}, the end of leg {good.last.legs}: a new plan"
         )
+        told += f" from there costs {max(good.extra, 0.0):.1%} more in all, and {good.tolerance:.0%} is allowed"
         return [*lines, f"{told}; {good.beyond}" if good.beyond else told]
 
     def _moment(self, since: float) -> str:

@@ -31,7 +31,7 @@ FLOWN_BESIDE = 1.5
 
 @dataclass(frozen=True)
 class Stop:
-    """A place (3,) [m] to which a list has been flown, up to leg `legs`, `since` [s] after the fix, at a `cost`."""
+    """A place (3,) [m] to which a list has been flown, up to leg `legs`, `since` [s] after a fix, at a `cost`."""
 
     legs: int
     since: float
@@ -101,8 +101,8 @@ def check_plan(path: Path, problem: Problem) -> None:
     most = FLOWN_BESIDE * max(problem.evaluator.integration.tolerance, leg.miss)
     require(
         off <= most,
-        f"leg 1 of the plan, flown in this scenario's currents, ends {off:,.0f} m from where the plan says: it is "
-        f"another scenario's plan, or the currents have changed since; {cure}; name newer currents with --currents",
+        f"leg 1 of the plan, flown in these currents, ends {off:,.0f} m from where the plan says: the plan is "
+        f"another scenario's, or the currents have changed since; {cure}; name newer currents by --currents",
     )
 
 
