@@ -99,11 +99,11 @@ def test_all_ways_to_say_the_way_through_water_agree(tmp_path, middle):
 
 @real
 def test_real_dives_with_their_way_through_water(tmp_path):
-    """The file holds no heading: the way through water is taken out of the recorded current, as a dead-reckoned place.
+    """The file holds no heading: the recorded current gives the way through water, as a dead-reckoned place.
 
-    So this checks times, places, signs and the reading to what a vehicle's rounded degrees allow; the speed it cannot.
+    So this checks times, places, signs and the reading, to what a vehicle's rounded degrees allow; not the speed.
     """
-    rows = list(csv.DictReader((DATA / "seaglider_sg542_saz_dac.csv").open()))
+    rows = list(csv.DictReader((DATA / "seaglider_sg542_saz_dac.csv").read_text().splitlines()))
     made = []
     for row in rows:
         start, end = ((float(row[f"lon_{side}"]), float(row[f"lat_{side}"])) for side in ("start", "end"))
@@ -165,7 +165,7 @@ def test_the_command_and_its_files(tmp_path, capsys):
     file = dives(tmp_path, f"dive,{HEAD},east,north,dac_east,dac_north", ("a", *FIXES, 500, 1800, 0.07, 0.08))
     said = command(capsys, "currents", file, "-o", tmp_path / "out.csv", "--json")
     (dive,) = strict_json(said.out)["dives"]
-    (row,) = csv.DictReader((tmp_path / "out.csv").open())
+    (row,) = csv.DictReader((tmp_path / "out.csv").read_text().splitlines())
     assert float(row["east_mps"]) == dive["east_mps"]
     assert dive["time"] == "2024-11-20T12:45:00Z"
     assert command(capsys, "currents", file, "-o", tmp_path / "out.txt").code == 2
