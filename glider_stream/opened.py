@@ -282,8 +282,7 @@ class OpenedScenario:
         require(
             len(old.legs) > 0, "the plan holds no leg, so nothing is left to be planned anew; plan a route first"
         )
-        share = f"the tolerance must be from 0 % up; got {tolerance:.0%}"
-        require(0 <= tolerance < np.inf, share)
+        require(0 <= tolerance < np.inf, f"the tolerance must be from 0 % up; got {tolerance:.0%}")
         before, since = self._at_fix(old, time)
         place = self._point((*fix, 0.0))
         now = self if currents is None else self._renewed(currents, before, place, old.goal)

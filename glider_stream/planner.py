@@ -291,7 +291,7 @@ def replan(
         >>> path = planner.query("small.h5", outputs=["plan.json"])
         >>> answer = planner.replan("plan.json", (-60.0, 60.0), 200.0)
         >>> answer.new.found, answer.good.whole
-        (True, False)
+        (True, True)
     """
     refines = options.get("within") is not None or options.get("seconds") is not None
     split_outputs(options.get("outputs", ()), refines)  # before the roadmap is read

@@ -138,7 +138,7 @@ class Planner(RoutePlanner):
         to = np.concatenate([backward.col, last]), np.concatenate([backward.data, np.maximum(times, 1e-9)])
         begin = np.concatenate([backward.row, np.full(last.size, nodes)])
         graph = csr_array((to[1], (begin, to[0])), shape=(nodes + 1, nodes + 1))
-        return np.asarray(dijkstra(graph, indices=nodes)[:nodes])
+        return np.asarray(dijkstra(graph, directed=True, indices=[nodes])[0, :nodes])
 
     def front(
         self,
