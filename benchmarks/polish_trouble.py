@@ -75,13 +75,13 @@ def faults(road: Any, before: Any, after: Any, asked: dict[str, Any], off: float
     return [what for what, wrong in found.items() if wrong]
 
 
-def random_ends(road: Any, rng: np.random.Generator) -> list[tuple[float, ...]]:
-    """Two places in open water, in the coordinates of the scenario."""
+def random_ends(road: Any, rng: np.random.Generator, surface: bool) -> list[tuple[float, ...]]:
+    """Two places in open water, in the coordinates of the scenario, at the surface if asked."""
     problem, ends = road.problem, []
     lo, hi = problem.lo, np.minimum(problem.hi, [np.inf, np.inf, 0.0])
     while len(ends) < 2:
         place = rng.uniform(lo, hi)
-        place[2] = rng.choice([place[2], hi[2]])
+        place[2] = hi[2] if surface else rng.choice([place[2], hi[2]])
         if problem.evaluator.allowed(place[None], problem.departure)[0]:
             ends.append(place)
     if problem.to_lonlat is None:
@@ -93,7 +93,7 @@ def tried(name: str, road: Any, asked: dict[str, Any], most: float, queries: int
     """The result of a case: gains, times, the worst end [m], faults."""
     rng, gains, seconds, worst, wrong = np.random.default_rng(5), [], [], 0.0, []
     while len(gains) < queries:
-        ends = random_ends(road, rng)
+        ends = random_ends(road, rng, "surfacing" in asked)
         before = road.query(*ends, **asked)
         if not before.legs:
             queries -= 1

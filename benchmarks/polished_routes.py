@@ -98,8 +98,14 @@ def field_routes(within: float | None) -> Iterator[dict[str, Any]]:
         scenario = scenario_from_text(scenario_text(seed))
         road = glider_stream.open(build_roadmap(scenario.problem()))
         row = compared(f"field {seed}", road, within)
-        finest = finest_times[str(seed)]["finest_s"]
-        yield row | {"level_set_s": finest, "over_percent": over_percent(row, finest)}
+        known = finest_times[str(seed)]
+        finest, arrives = known["finest_s"], known["path_that_arrives_s"]
+        yield row | {
+            "level_set_s": finest,
+            "over_percent": over_percent(row, finest),
+            "path_that_arrives_s": arrives,
+            "over_the_path_percent": over_percent(row, arrives),
+        }
 
 
 def ionian_routes(currents: Path | None, within: float | None) -> Iterator[dict[str, Any]]:
