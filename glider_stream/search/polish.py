@@ -112,10 +112,20 @@ class Polisher:
         return Chain(stops, glides, self.cost(stops, glides))
 
     def chain_of(self, path: Path) -> Chain | None:
-        """Return a path as a chain with exact legs; None if it cannot be flown."""
+        """Return a path as a chain with exact legs; None if it cannot be flown.
+
+        A leg that passes its stop within the tolerance may be too steep to end there. Then the legs meet where
+        they were flown to.
+        """
         stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)])
         angle = np.array([abs(leg.glide_angle) for leg in path.legs])
-        return self.chain(stops, angle, np.array([leg.heading for leg in path.legs]))
+        heading = np.array([leg.heading for leg in path.legs])
+        found = self.chain(stops, angle, heading)
+        if found is None and len(path.legs) > 1:
+            flown = [leg.trajectory[-1, 1:] for leg in path.legs[:-1]]
+            stops[1:-1] = [old if self.stays(old) else new for old, new in zip(stops[1:-1], flown, strict=True)]
+            found = self.chain(stops, angle, heading)
+        return found
 
     def hops(self, chain: Chain) -> list[Hop]:
         """Return the legs of a route in the form from which a path is made."""
