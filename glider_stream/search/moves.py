@@ -28,7 +28,7 @@ ROUGH = Effort(moves=15, enough=1e-4, barriers=1)
 """How long a route is polished that is changed afterwards."""
 PIECES = 16
 """A route that may hold its depth has about this many legs; with more the search ends in worse places."""
-HEIGHTS = (1.3, 1.5, 1.8)
+HEIGHTS = (1.3, 1.5, 1.8, 2.5)
 """Small yos are this many times as high as the least change of depth; the later ones are for routes that cannot
 be flown with the first."""
 YO_PAYS = 1e-3
