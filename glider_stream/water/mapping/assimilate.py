@@ -17,6 +17,7 @@ from ..frame import LocalFrame
 from ..ocean.file import OceanFile
 from ..ocean.flow import ocean_flow
 from ..ocean.grid import OutsideError
+from ..ocean.reader import LIMIT
 from .conditioned import Current, CurrentMap, condition
 from .fitting import Fit, fit_scales
 from .measured import Measurements, turned_back, within
@@ -36,8 +37,8 @@ class Corrected:
     """A forecast corrected by measurements.
 
     `forecast` as it was, or a calm in place of one (`calm`); `frame`: the plane of the map; `map`: of the
-    forecast's error; `fit`: its scales; `before` and `after` [m/s]: the rms difference of the measurements from the forecast
-    and from the corrected current; `notes`: what was left out.
+    forecast's error; `fit`: its scales; `before` and `after` [m/s]: the rms difference of the measurements from
+    the forecast and from the corrected current; `notes`: what was left out.
     """
 
     forecast: OceanFile
@@ -56,6 +57,12 @@ class Corrected:
 
     def members(self, count: int, seed: int = 0) -> list[OceanFile]:
         """Return so many currents that may be, given the measurements."""
+        need = count * (self.forecast.u.nbytes + self.forecast.v.nbytes)
+        require(
+            need <= LIMIT,
+            f"{count} members would take {need / 1e9:.1f} GB, more than {LIMIT / 1e9:.0f}; ask for fewer, or cut "
+            "the currents",
+        )
         samples = self.map.samples(count, seed)
         return [self._added(sample, np.inf, f"member {n}") for n, sample in enumerate(samples)]
 

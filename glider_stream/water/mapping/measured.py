@@ -21,7 +21,10 @@ FASTEST = 5.0
 class Measurements(Protocol):
     """Measurements of one kind."""
 
-    notes: tuple[str, ...]
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out or assumed."""
+        ...
 
     @property
     def places(self) -> tuple[Array, Array]:
