@@ -512,9 +512,9 @@ def assimilate(
     """Return a forecast of currents corrected by what vehicles measured, and write it to `output` as NetCDF.
 
     `dives`, `points`, `drifters`: files; `columns` names columns of CSV files that have other names. `scales` of
-    the forecast's error that are known; the others are fitted. `members`: so many currents that may be are written
-    to a second file, whose name ends in -members.nc. `inducing`: so many measurements stand for all, if there are
-    very many.
+    the forecast's error that are known; the others are fitted. `members`: so many currents that may be; they are
+    written to a second file, whose name ends in -members.nc. `inducing`: so many measurements stand for all, if
+    there are very many.
 
     Examples:
         >>> header = "start,lon,lat,max_depth,dac_east,dac_north"

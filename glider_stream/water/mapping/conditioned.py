@@ -9,15 +9,13 @@ from numpy.typing import ArrayLike
 
 from ...base.arrays import Array
 from ...base.settings import require
-from .covariance import AT_ONCE, Nodes, apart, covariance, noise_variance, pairs, variance
+from .covariance import AT_ONCE, LEAST_NOISE, Nodes, covariance, noise_variance, pairs, separated, variance
 from .features import Waves, draw
 from .observations import Observations, at_points, thinned
 from .scales import Scales, along, stretched
 
 MOST_EXACT = 3000
 """An exact map uses at most this many measurements (6000 values): 0.3 GB, and some 10 s on one core."""
-LEAST_NOISE = 1e-6
-"""The least standard deviation of noise, in shares of the speed, that keeps the equations well-posed."""
 
 
 class Current(Protocol):
@@ -82,7 +80,7 @@ class Pull:
             here = (at[0][part], at[1][part], at[2][part], at[3][part])
             dx, dy = (here[n][:, None] - self.nodes[n] for n in range(2))
             near = along(self.scales.kernel, dx**2 + dy**2, self.scales.length, False)
-            factor = self.scales.speed**2 * near.f * apart(self.scales, here, self.nodes)
+            factor = self.scales.speed**2 * near.f * separated(self.scales, here, self.nodes)
             found[part] = (factor * dy) @ self.u - (factor * dx) @ self.v
         return np.asarray(found + self.constant[0] * y - self.constant[1] * x)
 
@@ -90,8 +88,8 @@ class Pull:
         """See Current. The kernel is a product: each place's part is found once for all depths and times."""
         found = np.empty((t.size, depth.size, x.size, 2))
         zero = np.zeros(1)
-        deep: Array | float = apart(self.scales, (zero, zero, stretched(depth), zero), (*self._flat(2),))
-        later: Array | float = apart(self.scales, (zero, zero, zero, t), (*self._flat(3),))
+        deep: Array | float = separated(self.scales, (zero, zero, stretched(depth), zero), (*self._flat(2),))
+        later: Array | float = separated(self.scales, (zero, zero, zero, t), (*self._flat(3),))
         deep, later = (
             np.broadcast_to(part, (n, self.u.size)) for part, n in ((deep, depth.size), (later, t.size))
         )

@@ -1,6 +1,6 @@
 """Covariances between measurements, and between places and measurements."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from .scales import Scales, alike, along
 
 AT_ONCE = 2_000_000
 """Covariances are found for at most this many pairs of nodes at a time, to bound the memory."""
+LEAST_NOISE = 1e-6
+"""The least standard deviation of noise, in shares of the speed, that keeps the equations well-posed."""
 SCALES = ("length", "depth", "time")
 """The scales on which covariances depend other than as a factor."""
 
@@ -21,13 +23,13 @@ def pairs(scales: Scales, a: Nodes, b: Nodes) -> tuple[Array, Array, Array]:
     """Return cov(u, u'), cov(u, v') and cov(v, v') (m, m') between places, without the constant current."""
     dx, dy = (a[n][:, None] - b[n] for n in range(2))
     near = along(scales.kernel, dx**2 + dy**2, scales.length, False)
-    factor = scales.speed**2 * apart(scales, a, b)
+    factor = scales.speed**2 * separated(scales, a, b)
     f, h = factor * near.f, factor * near.h
     return f - h * dy**2, h * dx * dy, f - h * dx**2
 
 
-def apart(scales: Scales, a: Nodes, b: Nodes) -> Array | float:
-    """Return the factor by which places differ in depth and time."""
+def separated(scales: Scales, a: Nodes, b: Nodes) -> Array | float:
+    """Return how alike currents are that lie apart in depth and time."""
     factor: Array | float = 1.0
     for n, order in ((2, "depth"), (3, "time")):
         if np.isfinite(getattr(scales, order)):
@@ -35,17 +37,23 @@ def apart(scales: Scales, a: Nodes, b: Nodes) -> Array | float:
     return factor
 
 
-def slopes(scales: Scales, a: Nodes, b: Nodes, of: str) -> tuple[Array, Array, Array]:
-    """Return the derivatives of `pairs` by the logarithm of the scale `of`, one of SCALES."""
+def slopes(scales: Scales, a: Nodes, b: Nodes, of: Sequence[str]) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield `pairs`, then its derivatives by the logarithm of each of the scales `of`, of SCALES."""
     dx, dy = (a[n][:, None] - b[n] for n in range(2))
-    near = along(scales.kernel, dx**2 + dy**2, scales.length, of == "length")
-    factor: Array | float = scales.speed**2
-    for n, order in ((2, "depth"), (3, "time")):
-        value, slope = alike(order, a[n][:, None] - b[n], getattr(scales, order), of == order)
-        factor = factor * (slope if of == order else value)
-    f, h = (near.f_slope, near.h_slope) if of == "length" else (near.f, near.h)
-    f, h = factor * f, factor * h
-    return f - h * dy**2, h * dx * dy, f - h * dx**2
+    xx, xy, yy = dx * dx, dx * dy, dy * dy
+    near = along(scales.kernel, xx + yy, scales.length, True)
+    apart = {
+        order: alike(order, a[n][:, None] - b[n], getattr(scales, order), True)
+        for n, order in ((2, "depth"), (3, "time"))
+        if np.isfinite(getattr(scales, order))
+    }
+    for name in (None, *of):
+        factor: Array | float = scales.speed**2
+        for order, (value, slope) in apart.items():
+            factor = factor * (slope if name == order else value)
+        f, h = (near.f_slope, near.h_slope) if name == "length" else (near.f, near.h)
+        f, h = factor * f, factor * h
+        yield f - h * yy, h * xy, f - h * xx
 
 
 def _blocks(rows: Observations, width: int) -> Iterator[tuple[slice, Observations]]:
@@ -59,26 +67,40 @@ def _blocks(rows: Observations, width: int) -> Iterator[tuple[slice, Observation
         begin = end
 
 
-def covariance(scales: Scales, rows: Observations, columns: Observations, of: str | None = None) -> Array:
-    """Return the covariance (2n, 2n') of all u, then all v, of two sets of measurements, without their noise.
+def covariance(scales: Scales, rows: Observations, columns: Observations) -> Array:
+    """Return the covariance (2n, 2n') of all u, then all v, of two sets of measurements, without their noise."""
+    (result,) = _covariances(scales, rows, columns, None)
+    return result
 
-    `of`: instead, the derivative by the logarithm of this scale.
+
+def covariance_and_slopes(scales: Scales, rows: Observations, of: Sequence[str]) -> list[Array]:
+    """Return the covariance (2n, 2n) and its derivatives by the logarithm of each of the scales `of`, of SCALES.
+
+    A scale that is infinite cannot be among them.
     """
+    return _covariances(scales, rows, rows, of)
+
+
+def _covariances(
+    scales: Scales, rows: Observations, columns: Observations, of: Sequence[str] | None
+) -> list[Array]:
     n, m = rows.count, columns.count
-    result = np.empty((2 * n, 2 * m))
+    results = [np.empty((2 * n, 2 * m)) for _ in range(1 if of is None else 1 + len(of))]
     for which, part in _blocks(rows, columns.x.size):
-        if of is None:
-            found = pairs(scales, part.nodes, columns.nodes)
-        else:
-            found = slopes(scales, part.nodes, columns.nodes, of)
-        uu, uv, vv = (columns.means(part.means(block).T).T for block in found)
         a = slice(which.start, which.stop)
         b = slice(n + which.start, n + which.stop)
-        result[a, :m], result[a, m:], result[b, :m], result[b, m:] = uu, uv, uv, vv
-    if of is None and scales.mean > 0:
-        result[:n, :m] += scales.mean**2
-        result[n:, m:] += scales.mean**2
-    return result
+        every: Iterable[tuple[Array, Array, Array]]
+        if of is None:
+            every = [pairs(scales, part.nodes, columns.nodes)]
+        else:
+            every = slopes(scales, part.nodes, columns.nodes, of)
+        for result, found in zip(results, every, strict=True):
+            uu, uv, vv = (columns.means(part.means(block).T).T for block in found)
+            result[a, :m], result[a, m:], result[b, :m], result[b, m:] = uu, uv, uv, vv
+    if scales.mean > 0:
+        results[0][:n, :m] += scales.mean**2
+        results[0][n:, m:] += scales.mean**2
+    return results
 
 
 def variance(scales: Scales, rows: Observations) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from .covariance import SCALES, covariance
+from .covariance import LEAST_NOISE, SCALES, covariance_and_slopes
 from .observations import Observations, spread, thinned
 from .scales import KERNELS, Scales
 
@@ -32,6 +32,8 @@ FURTHEST = 7.0
 MESOSCALE = {"depth": 200.0, "time": 5 * 86_400.0}
 """The expected scales of depth [m] and time [s] of mesoscale currents."""
 FITTED = ("speed", "length", "depth", "time", "noise")
+HOPELESS = 1e30
+"""The loss of scales for which the covariance cannot be factored."""
 STEP = 1e-3
 """The step in a logarithm over which the gradient's differences give the second derivatives."""
 
@@ -181,29 +183,37 @@ def _loss(
     logs: Array | None = None,
 ) -> tuple[float, Array]:
     """Return minus the logarithm of the likelihood, with that of the expectation of scales, and its gradient."""
-    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg import cho_solve
+    from scipy.linalg.lapack import dpotrf, dpotri
 
-    floor = (1e-6 * expected.speed) ** 2
-    smooth = covariance(scales, at, at)
-    noise = np.tile(at.error**2 + scales.noise**2, 2) + floor
-    whole = smooth + np.diag(noise)
-    factor = cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
-    weights = cho_solve(factor, at.values, check_finite=False)
+    inner = [name for name in free if name in SCALES]
+    smooth, *slopes = covariance_and_slopes(scales, at, inner)
+    whole = smooth.copy()
+    floor = (LEAST_NOISE * expected.speed) ** 2
+    whole[np.diag_indices_from(whole)] += np.tile(at.error**2 + scales.noise**2, 2) + floor
+    root, failed = dpotrf(whole, lower=1, overwrite_a=1)
+    if failed:
+        return HOPELESS, np.zeros(len(free))
+    weights = cho_solve((root, True), at.values, check_finite=False)
     size = at.values.size
-    loss = 0.5 * float(at.values @ weights) + float(np.log(np.diag(factor[0])).sum())
+    loss = 0.5 * float(at.values @ weights) + float(np.log(np.diag(root)).sum())
     loss += 0.5 * size * math.log(2 * math.pi)
     if not free:
         return loss, np.zeros(0)
     assert logs is not None
-    inner = cho_solve(factor, np.eye(size), check_finite=False) - np.outer(weights, weights)
+    # d loss / d log(scale) = trace((K^-1 - w w^T) dK) / 2; LAPACK gives the lower triangle of K^-1
+    below = dpotri(root, lower=1)[0]
+    precision = np.tril(below) + np.tril(below, -1).T
     gradient = np.empty(len(free))
     for n, name in enumerate(free):
         if name == "noise":
-            gradient[n] = scales.noise**2 * float(np.trace(inner))
-        elif name == "speed":
-            constant = scales.mean**2 * np.kron(np.eye(2), np.ones((size // 2, size // 2)))
-            gradient[n] = float(np.sum(inner * (smooth - constant)))
-        else:
-            assert name in SCALES
-            gradient[n] = 0.5 * float(np.sum(inner * covariance(scales, at, at, name)))
+            gradient[n] = scales.noise**2 * float(np.trace(precision) - weights @ weights)
+            continue
+        slope = 2 * smooth if name == "speed" else slopes[inner.index(name)]
+        gradient[n] = 0.5 * float(np.vdot(precision, slope) - weights @ (slope @ weights))
+        if name == "speed" and scales.mean > 0:
+            half = size // 2
+            for part in (slice(0, half), slice(half, size)):
+                constant = float(precision[part, part].sum()) - float(weights[part].sum()) ** 2
+                gradient[n] -= scales.mean**2 * constant
     return loss + float((logs**2).sum()) / (2 * LOOSE**2), gradient + logs / LOOSE**2
