@@ -19,7 +19,7 @@ from glider_stream.water.mapping.features import draw
 from glider_stream.water.mapping.gridded import gridded
 
 WIDE, DEEP, LONG = 80e3, 400.0, 2 * 86_400.0
-SCALES = Scales(0.2, 20e3, depth=150.0, time=86_400.0, noise=0.02, mean=0.1)
+SCALES = Scales(0.2, 20e3, depth=60.0, time=86_400.0, noise=0.02, mean=0.1)
 
 
 def places(count, seed=0):
@@ -44,14 +44,14 @@ def mapped(truth):
 
 
 def psi_covariance(scales, r, dz, dt):
-    """The prior of the stream function, written out: Matern 5/2 (or Gaussian) in place and depth, 3/2 in time."""
+    """The prior of the stream function, written out: Matern 5/2 (or Gaussian) in place, 3/2 in depth and time."""
     if scales.kernel == "gaussian":
         phi = scales.length**2 * np.exp(-(r**2) / (2 * scales.length**2))
     else:
         s = np.sqrt(5) * r / scales.length
         phi = 3 / 5 * scales.length**2 * (1 + s + s**2 / 3) * np.exp(-s)
-    s = np.sqrt(5) * np.abs(dz) / scales.depth
-    depth = (1 + s + s**2 / 3) * np.exp(-s)
+    s = np.sqrt(3) * np.abs(dz) / scales.depth
+    depth = (1 + s) * np.exp(-s)
     s = np.sqrt(3) * np.abs(dt) / scales.time
     return scales.speed**2 * phi * depth * (1 + s) * np.exp(-s)
 
@@ -59,9 +59,9 @@ def psi_covariance(scales, r, dz, dt):
 @pytest.mark.parametrize("kernel", ["matern", "gaussian"])
 def test_velocities_covary_as_derivatives_of_the_stream_function(kernel):
     """cov(u, v') and the others, by central differences of the covariance of psi."""
-    scales = Scales(0.3, 15e3, depth=120.0, time=5e4, kernel=kernel)
+    scales = Scales(0.3, 15e3, depth=50.0, time=5e4, kernel=kernel)
     a, b = np.array([1e3, 2e3, 30.0, 1e4]), np.array([9e3, -4e3, 80.0, 3e4])
-    deep = [100 * np.log1p(place[2] / 100) for place in (a, b)]
+    deep = [20 * np.log1p(place[2] / 20) for place in (a, b)]
 
     def psi(ax, ay, bx, by):
         return psi_covariance(scales, np.hypot(ax - bx, ay - by), deep[0] - deep[1], a[3] - b[3])
@@ -118,7 +118,7 @@ def test_mean_and_samples_have_no_divergence(mapped):
 
 def test_without_noise_the_map_passes_through_the_measurements(truth):
     at = measured(truth, 25, noise=0.0)
-    scales = Scales(0.2, 20e3, depth=150.0, time=86_400.0)
+    scales = Scales(0.2, 20e3, depth=60.0, time=86_400.0)
     found = condition(at, scales)
     where = (at.x, at.y, at.depth, at.t)
     assert found.velocity(*where) == pytest.approx(np.stack([at.u, at.v], axis=-1), abs=1e-6)
@@ -221,7 +221,7 @@ def test_samples_have_the_maps_mean_and_deviation(mapped):
 
 @pytest.mark.parametrize("kernel", ["matern", "gaussian"])
 def test_waves_have_the_priors_covariance(kernel):
-    scales = Scales(0.2, 20e3, depth=150.0, time=86_400.0, mean=0.1, kernel=kernel)
+    scales = Scales(0.2, 20e3, depth=60.0, time=86_400.0, mean=0.1, kernel=kernel)
     at = at_points([0.0, 8e3], [0.0, 5e3], [0.0, 60.0], 0.0, 0.0, t=[0.0, 3e4])
     generator = np.random.default_rng(0)
     drawn = np.array(

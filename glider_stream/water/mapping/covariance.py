@@ -33,7 +33,7 @@ def separated(scales: Scales, a: Nodes, b: Nodes) -> Array | float:
     factor: Array | float = 1.0
     for n, order in ((2, "depth"), (3, "time")):
         if np.isfinite(getattr(scales, order)):
-            factor = factor * alike(order, a[n][:, None] - b[n], getattr(scales, order), False)[0]
+            factor = factor * alike(a[n][:, None] - b[n], getattr(scales, order), False)[0]
     return factor
 
 
@@ -43,7 +43,7 @@ def slopes(scales: Scales, a: Nodes, b: Nodes, of: Sequence[str]) -> Iterator[tu
     xx, xy, yy = dx * dx, dx * dy, dy * dy
     near = along(scales.kernel, xx + yy, scales.length, True)
     apart = {
-        order: alike(order, a[n][:, None] - b[n], getattr(scales, order), True)
+        order: alike(a[n][:, None] - b[n], getattr(scales, order), True)
         for n, order in ((2, "depth"), (3, "time"))
         if np.isfinite(getattr(scales, order))
     }

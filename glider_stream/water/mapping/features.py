@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from .covariance import AT_ONCE
-from .scales import ROOT_3, ROOT_5, Scales, stretched
+from .scales import ROOT_5, Scales, stretched
 
 WAVES = 2000
 """Waves in a sample. Over many samples their covariance is the prior's exactly; one sample is nearly Gaussian."""
@@ -80,11 +80,11 @@ def draw(scales: Scales, generator: np.random.Generator, waves: int = WAVES) -> 
     angle = generator.uniform(0, 2 * math.pi, waves)
     k = np.zeros((waves, 4))
     k[:, 0], k[:, 1] = kappa * np.cos(angle), kappa * np.sin(angle)
-    # the spectrum of a Matern kernel of order n/2 is Student's t with n degrees of freedom
-    for column, scale, order, root in ((2, scales.depth, 5, ROOT_5), (3, scales.time, 3, ROOT_3)):
-        t = generator.standard_t(order, size=waves)
+    for column, scale in ((2, scales.depth), (3, scales.time)):
+        # the spectrum of Matern's kernel of order 3/2 is Student's t with 3 degrees of freedom
+        t = generator.standard_t(3, size=waves)
         if math.isfinite(scale):
-            k[:, column] = t * root / (scale * math.sqrt(order))
+            k[:, column] = t / scale
     amplitude = scales.speed * math.sqrt(2 / waves) / kappa
     cos, sin = generator.normal(size=(2, waves)) * amplitude
     return Waves(k, cos, sin, generator.normal(size=2) * scales.mean)

@@ -14,8 +14,8 @@ from .covariance import LEAST_NOISE, SCALES, covariance_and_slopes
 from .observations import Observations, spread, thinned
 from .scales import KERNELS, Scales
 
-MOST_FITTED = 700
-"""The scales are fitted to at most this many measurements (1400 values), spread evenly; a map uses them all."""
+MOST_FITTED = 500
+"""The scales are fitted to at most this many measurements (1000 values), spread evenly; a map uses them all."""
 FIRST_LOOK = 150
 """The fit from each start uses this many measurements; only the best is repeated with all."""
 STARTS = 4
@@ -29,8 +29,8 @@ SETTLED = 0.5
 """A scale whose logarithm has a larger standard deviation after the fit, relative to LOOSE, is undetermined."""
 FURTHEST = 7.0
 """No scale is fitted beyond a factor of exp(FURTHEST) from what is expected."""
-MESOSCALE = {"depth": 200.0, "time": 5 * 86_400.0}
-"""The expected scales of depth [m] and time [s] of mesoscale currents."""
+MESOSCALE = {"depth": 60.0, "time": 5 * 86_400.0}
+"""The expected scales of depth (at the surface) [m] and time [s] of mesoscale currents."""
 FITTED = ("speed", "length", "depth", "time", "noise")
 HOPELESS = 1e30
 """The loss of scales for which the covariance cannot be factored."""

@@ -8,11 +8,14 @@ from numpy.typing import ArrayLike
 
 from ...base.arrays import Array, Bools, Index
 from ...base.settings import require
-from .scales import stretched
+from .scales import STRETCH, stretched
 
-HALF_DIVE = 6
-"""Gauss-Legendre nodes in the dive, and as many in the climb, over which a single yo is averaged."""
-MANY_YOS = 3, 6
+HALF_DIVE = 8
+"""Gauss-Legendre nodes in the dive, and as many in the climb, over which a single yo is averaged.
+
+With a depth scale of 60 m they are off by 1 mm/s in currents of 0.2 m/s, a tenth of what a glider measures.
+"""
+MANY_YOS = 3, 8
 """Gauss-Legendre nodes along the track, and of depth at each, over which many yos are averaged."""
 DRIFT_NODES = 3
 """Gauss-Legendre nodes in each straight part of a drifter's path."""
@@ -139,16 +142,33 @@ def _gauss(count: int) -> tuple[Array, Array]:
     return (node + 1) / 2, weight / 2
 
 
-def _path_of_yos(yos: int) -> tuple[Array, Array, Array]:
-    """Return shares of the track and of the depth, and weights, over which dives of so many yos are averaged."""
+def _over_depth(top: Array, bottom: Array, count: int) -> tuple[Array, Array]:
+    """Return depths (n, count) [m] and weights with sum 1 for the mean over depths; nodes are denser at the top.
+
+    They are Gauss-Legendre nodes of the stretched depth, as currents change more in a metre near the surface.
+    """
+    node, weight = _gauss(count)
+    low, high = stretched(top)[:, None], stretched(bottom)[:, None]
+    depth = STRETCH * np.expm1((low + node * (high - low)) / STRETCH)
+    weights = weight * (1 + depth / STRETCH)
+    return depth, weights / weights.sum(axis=1, keepdims=True)
+
+
+def _path(top: Array, bottom: Array, yos: int) -> tuple[Array, Array, Array]:
+    """Return shares of the track, depths [m] and weights (n, nodes) of dives of so many yos."""
     if yos == 1:
-        half, weight = _gauss(HALF_DIVE)
-        share = np.concatenate([half / 2, 0.5 + half / 2])
-        deep = np.concatenate([half, 1 - half])
-        return share, deep, np.tile(weight / 2, 2)
-    (along, along_weight), (deep, deep_weight) = map(_gauss, MANY_YOS)
-    share, deep = (part.ravel() for part in np.meshgrid(along, deep, indexing="ij"))
-    return share, deep, np.outer(along_weight, deep_weight).ravel()
+        depth, weight = _over_depth(top, bottom, HALF_DIVE)
+        down = (depth - top[:, None]) / (bottom - top)[:, None] / 2
+        share = np.concatenate([down, 1 - down], axis=1)
+        return share, np.tile(depth, 2), np.tile(weight / 2, 2)
+    depth, weight = _over_depth(top, bottom, MANY_YOS[1])
+    along, along_weight = _gauss(MANY_YOS[0])
+    shares = np.tile(np.repeat(along, MANY_YOS[1]), (top.size, 1))
+    return (
+        shares,
+        np.tile(depth, MANY_YOS[0]),
+        np.repeat(along_weight, MANY_YOS[1]) * np.tile(weight, MANY_YOS[0]),
+    )
 
 
 def dive_averages(
@@ -176,14 +196,12 @@ def dive_averages(
     begin, finish = _columns(count, start_times=times[0], end_times=times[1])
     require(bool((bottom > top).all()), "a dive must go below its top; leave out those that do not")
     require(bool((finish >= begin).all()), "a dive must end after it starts; mend its times")
-    share, deep, weight = _path_of_yos(yos)
+    share, depth, weight = _path(top, bottom, yos)
     x, y = (start[:, n, None] + share * (end - start)[:, n, None] for n in range(2))
-    depth = top[:, None] + deep * (bottom - top)[:, None]
     t = begin[:, None] + share * (finish - begin)[:, None]
-    first = np.arange(count) * weight.size
-    return Observations(
-        u, v, error, first, x.ravel(), y.ravel(), depth.ravel(), t.ravel(), np.tile(weight, count)
-    )
+    first = np.arange(count) * weight.shape[1]
+    at = (part.ravel() for part in (x, y, depth, t, weight))
+    return Observations(u, v, error, first, *at)
 
 
 def drifts(x: ArrayLike, y: ArrayLike, t: ArrayLike, depth: float = 0.0, *, error: float = 0.0) -> Observations:

@@ -19,7 +19,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.settings import require
 
-STRETCH = 100.0
+STRETCH = 20.0
 """Depths are compared as STRETCH log(1 + depth / STRETCH) [m]: deep currents are alike over longer distances."""
 KERNELS = ("matern", "gaussian")
 """Kernels of the stream function: Matern's of order 5/2, whose currents are rough, and the Gaussian's, smooth."""
@@ -94,17 +94,12 @@ def along(kernel: str, squared: Array, length: float, slopes: bool) -> Along:
     return Along(f, h, s**2 * decay, h * (s - 2)) if slopes else Along(f, h, f, h)
 
 
-def alike(order: str, apart: Array, scale: float, slopes: bool) -> tuple[Array, Array]:
-    """Return the correlation over a depth ("depth", Matern 5/2) or a time ("time", Matern 3/2), and its slope.
+def alike(apart: Array, scale: float, slopes: bool) -> tuple[Array, Array]:
+    """Return the correlation over depths or times that lie apart (Matern's kernel of order 3/2), and its slope.
 
-    The slope is the derivative by log(scale).
+    The slope is the derivative by log(scale). Profiles of currents are rough: smoother kernels put back worse
+    what lies between levels.
     """
-    if math.isinf(scale):
-        return np.ones_like(apart), np.zeros_like(apart)
-    if order == "time":
-        s = ROOT_3 / scale * np.abs(apart)
-        decay = np.exp(-s)
-        return (1 + s) * decay, s**2 * decay if slopes else decay
-    s = ROOT_5 / scale * np.abs(apart)
+    s = ROOT_3 / scale * np.abs(apart)
     decay = np.exp(-s)
-    return (1 + s + s**2 / 3) * decay, s**2 * (1 + s) / 3 * decay if slopes else decay
+    return (1 + s) * decay, s**2 * decay if slopes else decay
