@@ -11,7 +11,7 @@ from ...base.arrays import Array
 from ...base.settings import require
 from .covariance import AT_ONCE, LEAST_NOISE, Nodes, covariance, noise_variance, pairs, separated, variance
 from .features import Waves, draw
-from .observations import Observations, at_points, thinned
+from .observations import Observations, thinned
 from .scales import Scales, along, stretched
 
 MOST_EXACT = 3000
@@ -87,29 +87,29 @@ class Pull:
     def on_grid(self, x: Array, y: Array, depth: Array, t: Array) -> Array:
         """See Current. The kernel is a product: each place's part is found once for all depths and times."""
         found = np.empty((t.size, depth.size, x.size, 2))
-        zero = np.zeros(1)
-        deep: Array | float = separated(self.scales, (zero, zero, stretched(depth), zero), (*self._flat(2),))
-        later: Array | float = separated(self.scales, (zero, zero, zero, t), (*self._flat(3),))
-        deep, later = (
-            np.broadcast_to(part, (n, self.u.size)) for part, n in ((deep, depth.size), (later, t.size))
-        )
-        above = (later[:, None, :] * deep).reshape(-1, self.u.size)
+        above = _above(self.scales, self.nodes, depth, t)
         for part in self._blocks(x.size):
-            dx, dy = (at[part][:, None] - self.nodes[n] for n, at in enumerate((x, y)))
-            near = along(self.scales.kernel, dx**2 + dy**2, self.scales.length, False)
-            f, h = self.scales.speed**2 * near.f, self.scales.speed**2 * near.h
-            pulled = (
-                (f - h * dy**2) * self.u + h * dx * dy * self.v,
-                (f - h * dx**2) * self.v + h * dx * dy * self.u,
-            )
-            for n in range(2):
-                found[:, :, part, n] = (above @ pulled[n].T).reshape(t.size, depth.size, -1)
+            uu, uv, vv = _plane(self.scales, x[part], y[part], self.nodes)
+            for n, pulled in enumerate((uu * self.u + uv * self.v, uv * self.u + vv * self.v)):
+                found[:, :, part, n] = (above @ pulled.T).reshape(t.size, depth.size, -1)
         return found + self.constant
 
-    def _flat(self, kept: int) -> Nodes:
-        """Return the nodes with all but one of depth and time left out."""
-        x, y, z, t = (part if n == kept else np.zeros_like(part) for n, part in enumerate(self.nodes))
-        return x, y, z, t
+
+def _above(scales: Scales, nodes: Nodes, depth: Array, t: Array) -> Array:
+    """Return the part of covariances that depth and time make (nt nz, nodes), for all depths at each time."""
+    zero = np.zeros(1)
+    found = np.ones((t.size, depth.size, nodes[0].size))
+    flat = np.zeros_like(nodes[0])
+    found *= separated(scales, (zero, zero, stretched(depth), zero), (flat, flat, nodes[2], flat))
+    later = separated(scales, (zero, zero, zero, t), (flat, flat, flat, nodes[3]))
+    found *= later[:, None, :] if isinstance(later, np.ndarray) else later
+    return found.reshape(-1, nodes[0].size)
+
+
+def _plane(scales: Scales, x: Array, y: Array, nodes: Nodes) -> tuple[Array, Array, Array]:
+    """Return the part of `pairs` that the places x, y (m) make: (m, nodes) each."""
+    here, there = ((at[0], at[1], np.zeros_like(at[0]), np.zeros_like(at[0])) for at in ((x, y), nodes))
+    return pairs(scales, here, there)
 
 
 @dataclass(frozen=True)
@@ -175,23 +175,36 @@ class CurrentMap:
         places = _places(x, y, depth, t)
         count, rows = places[0].size, self.inducing or self.at
         found = np.empty((count, 2))
-        step = max(1, AT_ONCE // (2 * rows.x.size))
+        step = max(1, AT_ONCE // rows.x.size)
         for n in range(0, count, step):
-            px, py, deep, when = (part[n : n + step] for part in places)
-            nothing = np.zeros(px.size)
-            targets = at_points(px, py, deep, nothing, nothing, t=when)
-            known = self._solved.explained(covariance(self.scales, rows, targets))
-            left = np.maximum(self.scales.speed**2 + self.scales.mean**2 - known, 0)
-            found[n : n + step] = np.sqrt(left).reshape(2, -1).T
+            x, y, depth, t = (part[n : n + step] for part in places)
+            uu, uv, vv = (
+                rows.means(part.T) for part in pairs(self.scales, (x, y, stretched(depth), t), rows.nodes)
+            )
+            found[n : n + step] = self._left(np.block([[uu, uv], [uv, vv]]))
         return found
 
     def deviation_on_grid(self, x: Array, y: Array, depth: Array, t: Array) -> Array:
         """Return the standard deviation (nt, nz, m, 2) [m/s], at the places of `on_grid`."""
-        found = np.empty((t.size, depth.size, x.size, 2))
-        for i, when in enumerate(t):
-            for k, deep in enumerate(depth):
-                found[i, k] = self.deviation(x, y, deep, when)
-        return found
+        rows = self.inducing or self.at
+        found = np.empty((t.size * depth.size, x.size, 2))
+        above = _above(self.scales, rows.nodes, depth, t)
+        step = max(1, AT_ONCE // rows.x.size)
+        for n in range(0, x.size, step):
+            part = slice(n, n + step)
+            plane = _plane(self.scales, x[part], y[part], rows.nodes)
+            for k, factor in enumerate(above):
+                uu, uv, vv = (rows.means((block * factor).T) for block in plane)
+                found[k, part] = self._left(np.block([[uu, uv], [uv, vv]]))
+        return found.reshape(t.size, depth.size, x.size, 2)
+
+    def _left(self, across: Array) -> Array:
+        """Return the deviation (m, 2) that is left, from the covariance (2n, 2m), without the constant current."""
+        half, places = across.shape[0] // 2, across.shape[1] // 2
+        across[:half, :places] += self.scales.mean**2
+        across[half:, places:] += self.scales.mean**2
+        left = self.scales.speed**2 + self.scales.mean**2 - self._solved.explained(across)
+        return np.sqrt(np.maximum(left, 0)).reshape(2, -1).T
 
     def samples(self, count: int, seed: int = 0) -> list[Sample]:
         """Return so many samples; the k-th depends on `seed` and k alone."""

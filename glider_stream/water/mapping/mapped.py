@@ -7,7 +7,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.checks import Range
 from ...base.settings import require
-from ..frame import MAX_SCALE_ERROR, LocalFrame, eastward
+from ..frame import MAX_SCALE_ERROR, eastward
 from ..ocean.file import OceanFile, Times, parse_time
 from ..ocean.grid import EARTH, LonLatGrid
 from ..ocean.levels import held_above
@@ -56,7 +56,7 @@ def map_currents(
     )
     calm = _calm(lon, lat, spacing, np.array(depth, dtype=np.float64), moments)
     frame = frame_of(measurements)
-    error = LocalFrame.scale_error(frame, lon, lat)
+    error = frame.scale_error(lon, lat)
     require(
         error <= MAX_SCALE_ERROR,
         f"the map is too wide for a flat frame about its measurements, whose lengths would be wrong by "
