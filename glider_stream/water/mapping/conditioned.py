@@ -177,10 +177,9 @@ class CurrentMap:
         found = np.empty((count, 2))
         step = max(1, AT_ONCE // rows.x.size)
         for n in range(0, count, step):
-            x, y, depth, t = (part[n : n + step] for part in places)
-            uu, uv, vv = (
-                rows.means(part.T) for part in pairs(self.scales, (x, y, stretched(depth), t), rows.nodes)
-            )
+            px, py, deep, when = (part[n : n + step] for part in places)
+            every = pairs(self.scales, (px, py, stretched(deep), when), rows.nodes)
+            uu, uv, vv = (rows.means(block.T) for block in every)
             found[n : n + step] = self._left(np.block([[uu, uv], [uv, vv]]))
         return found
 
@@ -199,7 +198,7 @@ class CurrentMap:
         return found.reshape(t.size, depth.size, x.size, 2)
 
     def _left(self, across: Array) -> Array:
-        """Return the deviation (m, 2) that is left, from the covariance (2n, 2m), without the constant current."""
+        """Return the deviation (m, 2) that is left; `across` (2n, 2m): covariances without the constant current."""
         half, places = across.shape[0] // 2, across.shape[1] // 2
         across[:half, :places] += self.scales.mean**2
         across[half:, places:] += self.scales.mean**2
