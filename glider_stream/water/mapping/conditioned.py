@@ -198,7 +198,7 @@ class CurrentMap:
         return found.reshape(t.size, depth.size, x.size, 2)
 
     def _left(self, across: Array) -> Array:
-        """Return the deviation (m, 2) that is left; `across` (2n, 2m): covariances without the constant current."""
+        """Return the deviation (m, 2); `across` (2n, 2m): covariances, without the constant current."""
         half, places = across.shape[0] // 2, across.shape[1] // 2
         across[:half, :places] += self.scales.mean**2
         across[half:, places:] += self.scales.mean**2
