@@ -138,6 +138,8 @@ def test_files_that_cannot_be_used(tmp_path):
         (xr.Dataset({"temperature": ("time", [1.0])}), "holds no current averaged over a dive"),
         (packed, "holds degrees and minutes in one number"),
         (series.drop_vars("depth"), "holds no depth"),
+        (series.assign(depth=np.nan * series.depth), r"`depth` in dive\.nc is missing everywhere"),
+        (seaglider(log_gps_lon=("gps_info", [8.5, np.nan, 8.4])), "a dive has no longitude in degrees"),
         (series.assign(depth=0 * series.depth + 50.0), "holds no dive from the surface"),
         (seaglider().isel(gps_info=slice(2)), "must hold three fixes"),
         (profile(0).drop_vars("time_uv"), "is one number, and neither log_gps_lat nor time_uv says where"),

@@ -264,7 +264,9 @@ def _first_of(name: str, data: Any, which: Sequence[str], what: str) -> Array:
     if found is None:
         raise InputError(f"{name} holds no {what} ({', '.join(which)}); add it, or give a CSV file")
     values = np.atleast_1d(np.asarray(data[found].values, dtype=np.float64)).ravel()
-    return np.where(np.abs(values) < 1e5, values, np.nan)
+    values = np.where(np.abs(values) < 1e5, values, np.nan)
+    require(bool(np.isfinite(values).any()), f"`{found}` in {name} is missing everywhere; give a CSV file")
+    return values
 
 
 def _left_out(name: str, good: NDArray[np.bool_], why: str) -> tuple[str, ...]:

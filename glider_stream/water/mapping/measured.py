@@ -99,7 +99,7 @@ class Points(_Table):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _check("a point", self.lat, self.east, self.north)
+        _check("a point", self.lon, self.lat, self.east, self.north)
 
     @property
     def count(self) -> int:
@@ -145,8 +145,8 @@ class Dives(_Table):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _check("a dive", self.lat, self.east, self.north)
-        _check("a dive", self.lat_end, self.east, self.north)
+        _check("a dive", self.lon, self.lat, self.east, self.north)
+        _check("a dive", self.lon_end, self.lat_end, self.east, self.north)
 
     @property
     def count(self) -> int:
@@ -253,7 +253,8 @@ class Drifters(_Table):
         return Observations(joined.u, joined.v, joined.error, *at)
 
 
-def _check(what: str, lat: Array, east: Array, north: Array) -> None:
+def _check(what: str, lon: Array, lat: Array, east: Array, north: Array) -> None:
+    require(bool((np.abs(lon) <= 720).all()), f"{what} has no longitude in degrees; mend it, or leave it out")
     require(bool((np.abs(lat) <= 90).all()), f"{what} has a latitude beyond a pole; mend it, or swap it with lon")
     fastest = float(np.hypot(east, north).max(initial=0.0))
     require(fastest <= FASTEST, f"{what} has a current of {fastest:.3g} m/s, above {FASTEST:g}; give m/s")
