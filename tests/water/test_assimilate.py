@@ -91,6 +91,16 @@ def test_what_lies_outside_is_left_out_and_said(forecast):
 NAMES = ("lon", "lat", "lon_end", "lat_end", "start", "end", "bottom", "east", "north", "error")
 
 
+def test_a_forecast_of_one_level_is_corrected_at_all_depths(tmp_path):
+    """Its level is held at all depths, so a dive's mean is a measurement of it."""
+    forecast = read_currents(written(tmp_path, dataset(depth=None, hours=HOURS)))
+    found = assimilate(forecast, [dives(east=0.14)], {"speed": 0.1, "length": 15e3, "time": 3e5, "noise": 0.01})
+    assert found.fit.held["depth"] == "currents.nc has one level, which is held at all depths"
+    assert (found.file.u - forecast.u)[0, 0, 5, 5] > 0.07
+    given = assimilate(forecast, [dives(east=0.14)], SCALES | {"time": 3e5})
+    assert given.fit.scales.depth == 60.0
+
+
 def test_directions_are_the_earths(tmp_path):
     """A current toward east measured far from the frame's centre corrects the current toward east."""
     lon, lat = np.arange(0.0, 30.1, 1.0), np.arange(65.0, 71.1, 1.0)

@@ -181,9 +181,17 @@ def assimilate(
     )
     frame = frame_of(measurements)
     observations, notes = compared(forecast, frame, measurements)
-    found = fit_scales(observations, {**known, "mean": 0.0}, kernel=kernel, seed=seed)
-    held = {**found.held, "mean": "the error of a forecast fades with distance"}
-    return corrected(forecast, frame, observations, replace(found, held=held), inducing, notes)
+    fit = fit_for(forecast, observations, known | {"mean": 0.0}, kernel, seed)
+    held = fit.held | {"mean": "the error of a forecast fades with distance"}
+    return corrected(forecast, frame, observations, replace(fit, held=held), inducing, notes)
+
+
+def fit_for(on: OceanFile, at: Observations, known: Mapping[str, float], kernel: str, seed: int) -> Fit:
+    """Return the fitted scales of a current on the levels of a file: one level is held at all depths."""
+    if not on.surface or "depth" in known:
+        return fit_scales(at, known, kernel=kernel, seed=seed)
+    fit = fit_scales(at, {**known, "depth": np.inf}, kernel=kernel, seed=seed)
+    return replace(fit, held=fit.held | {"depth": f"{on.name} has one level, which is held at all depths"})
 
 
 def frame_of(measurements: Sequence[Measurements]) -> LocalFrame:

@@ -11,8 +11,7 @@ from ..frame import MAX_SCALE_ERROR, eastward
 from ..ocean.file import OceanFile, Times, parse_time
 from ..ocean.grid import EARTH, LonLatGrid
 from ..ocean.levels import held_above
-from .assimilate import Corrected, compared, corrected, frame_of
-from .fitting import fit_scales
+from .assimilate import Corrected, compared, corrected, fit_for, frame_of
 from .measured import Measurements
 
 MOST_POINTS = 20_000_000
@@ -35,8 +34,9 @@ def map_currents(
     """Return a map of the current over `lon`, `lat` [degrees], every `spacing` [m] at most, from measurements.
 
     At depths [m], and at `times` (ISO 8601, UTC), which are needed where the measurements are of several times. A
-    single depth of 0 is held at all depths. Far from all measurements the map is the constant current that they
-    have in common, and its deviation says how little that means. It knows no land and no bottom.
+    single depth of 0 is held at all depths, and the current is then the same at all of them, unless the scale
+    `depth` is given. Far from all measurements the map is the constant current that they have in common, and its
+    deviation says how little that means. It knows no land and no bottom.
     """
     require(len(measurements) > 0, "a map needs measurements; got none: add dives, points or drifters")
     moments = np.array([parse_time(text, "`times`") for text in times], dtype="datetime64[ms]")
@@ -63,7 +63,7 @@ def map_currents(
         f"{100 * error:.1f} %; make it smaller",
     )
     observations, notes = compared(calm, frame, measurements, calm=True)
-    fit = fit_scales(observations, scales, kernel=kernel, seed=seed)
+    fit = fit_for(calm, observations, dict(scales or {}), kernel, seed)
     return corrected(calm, frame, observations, fit, inducing, notes, calm=True)
 
 
