@@ -177,6 +177,38 @@ def test_a_map_without_a_forecast(tmp_path, monkeypatch, capsys):
     assert found.u[0, 1, 4, 2] == pytest.approx(0.4, abs=0.15)
 
 
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ([], "there are no measurements; give files of dives, points or drifters"),
+        (["--dives", "dives.csv", "--scale", "length"], "'length' is not NAME=NUMBER, such as length=20000"),
+        (["--dives", "dives.csv", "--scale", "width=3"], "the scale `width` is not known; choose from: speed"),
+        (["--dives", "dives.csv", "--members", "-1"], "`members` must be 0 or more; got -1"),
+        (["--dives", "dives.csv", "--kernel", "cubic"], "`kernel` must be one of matern, gaussian; got 'cubic'"),
+        (["--dives", "dives.csv", "--inducing", "0"], "`inducing` must be at least 1; got 0"),
+        (["--dives", "dives.csv", "--column", "west=u"], "`west` is not known; choose from: lon, lat"),
+        (
+            ["--dives", "dives.csv", "--points", "p.csv", "--column", "east=u"],
+            "columns can be named for one kind",
+        ),
+        (
+            ["--points", "dives.csv"],
+            "dives.csv has no column for `lon`, such as lon; name it, or add it; it has: ",
+        ),
+        (["--dives", "forecast.nc"], "forecast.nc holds no current averaged over a dive"),
+        (["--dives", "nowhere.csv"], "the file of dives nowhere.csv does not exist"),
+    ],
+)
+def test_the_command_refuses_with_the_cure(tmp_path, monkeypatch, capsys, given, sentence):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, dataset(hours=HOURS), "forecast.nc")
+    (tmp_path / "dives.csv").write_text(DIVES)
+    said = command(capsys, "assimilate", "forecast.nc", *given, "-o", "better.nc")
+    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert sentence in said.err
+    assert not (tmp_path / "better.nc").exists()
+
+
 def test_drifters_are_displacements():
     time = START + np.arange(4) * HOUR
     lon, lat = np.array([20.0, 20.02, 21.0, 21.02]), np.full(4, 60.0)
