@@ -14,10 +14,10 @@ from .covariance import LEAST_NOISE, SCALES, covariance_and_slopes
 from .observations import Observations, spread, thinned
 from .scales import KERNELS, Scales
 
-MOST_FITTED = 500
-"""The scales are fitted to at most this many measurements (1000 values), spread evenly; a map uses them all."""
-FIRST_LOOK = 150
-"""The fit from each start uses this many measurements; only the best is repeated with all."""
+MOST_FITTED = 500, 3000
+"""Scales are fitted to at most so many measurements with so many nodes, spread evenly; a map uses them all."""
+FIRST_LOOK = 150, 600
+"""The fit from each start uses so many measurements and nodes; only the best is continued with MOST_FITTED."""
 STARTS = 4
 """The number of starts, of which the first is the expected scales."""
 LOOSE = 1.5
@@ -98,8 +98,7 @@ def fit_scales(
     expected, free, held = _expected(at, known, kernel)
     if not free:
         return Fit(expected, {}, (), held, at.count, at.count, -_loss(at, expected, (), expected)[0])
-    few = at.take(np.array(thinned(at, FIRST_LOOK)))
-    many = at.take(np.array(thinned(at, MOST_FITTED)))
+    few, many = _some(at, *FIRST_LOOK), _some(at, *MOST_FITTED)
     generator = np.random.default_rng(seed)
     starts = [np.zeros(len(free)), *generator.normal(0, LOOSE / 2, (STARTS - 1, len(free)))]
     bounds = [(-FURTHEST, FURTHEST)] * len(free)
@@ -131,6 +130,12 @@ def fit_scales(
     by_name = {name: float(error) for name, error in zip(free, errors, strict=True)}
     prior = float((logs**2).sum()) / (2 * LOOSE**2)
     return Fit(scales, by_name, undetermined, held, many.count, at.count, prior - float(found.fun))
+
+
+def _some(at: Observations, most: int, nodes: int) -> Observations:
+    """Return at most so many measurements with so many nodes, spread evenly."""
+    share = min(1.0, nodes / at.x.size)
+    return at.take(np.array(thinned(at, min(most, max(2, int(at.count * share))))))
 
 
 def _expected(
