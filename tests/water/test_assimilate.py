@@ -293,6 +293,20 @@ def test_a_csv_file_of_dives(tmp_path):
             read_dives(tmp_path / "bad.csv")
 
 
+def test_dives_that_the_command_currents_writes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = ["t_start,lon_start,lat_start,t_end,lon_end,lat_end,east,north,max_depth"]
+    rows += [f"2024-11-20T0{n}:00,20.5,60.5,2024-11-20T0{n + 1}:00,20.52,60.5,100,50,80" for n in (1, 2)]
+    (tmp_path / "flown.csv").write_text("\n".join(rows))
+    assert command(capsys, "currents", "flown.csv", "-o", "dac.csv").code == 0
+    found = read_dives("dac.csv")
+    assert found.bottom.tolist() == [80.0, 80.0]
+    # 1.1 km over ground and 0.1 km through water within an hour
+    assert found.east == pytest.approx(0.277, abs=0.01)
+    assert str(found.start[0]) == "2024-11-20T01:30:00.000"
+    assert (found.error > 0).all()
+
+
 def test_a_plan_reads_the_member_it_names(tmp_path):
     """The scenario's own reader gives the member that it names."""
     forecast = read_currents(written(tmp_path, dataset(hours=HOURS)))

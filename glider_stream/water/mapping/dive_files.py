@@ -36,9 +36,25 @@ DIVE_COLUMNS = {
     "start": ("start", "time", "t_start", "time_start", "start_time", "t_start_unix"),
     "end": ("end", "t_end", "time_end", "end_time", "t_end_unix"),
     "bottom": ("bottom", "max_depth", "max_depth_m", "depth", "depth_max", "depth_m"),
-    "east": ("dac_east", "dac_east_mps", "u", "dac_u", "depth_avg_curr_east", "depth_average_current_east"),
-    "north": ("dac_north", "dac_north_mps", "v", "dac_v", "depth_avg_curr_north", "depth_average_current_north"),
-    "error": ("error", "dac_error", "dac_error_mps", "depth_avg_curr_error"),
+    "east": (
+        "dac_east",
+        "dac_east_mps",
+        "east_mps",
+        "u",
+        "dac_u",
+        "depth_avg_curr_east",
+        "depth_average_current_east",
+    ),
+    "north": (
+        "dac_north",
+        "dac_north_mps",
+        "north_mps",
+        "v",
+        "dac_v",
+        "depth_avg_curr_north",
+        "depth_average_current_north",
+    ),
+    "error": ("error", "dac_error", "dac_error_mps", "depth_avg_curr_error", "error_east_mps"),
 }
 POINT_COLUMNS = {
     "lon": ("lon", "longitude"),
