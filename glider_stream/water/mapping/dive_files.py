@@ -347,7 +347,8 @@ def _series(name: str, data: Any, pair: tuple[str, str], east: Array, north: Arr
     """Return the dives of a time series (Slocum, pyglider), each from one surfacing to the next.
 
     A vehicle reports the current of a dive when it is back at the surface: it is the last report before the next
-    dive begins.
+    dive begins. Programs that fill gaps repeat an old report, so one that repeats the report before, to the last
+    digit, is none.
     """
     clock = next((part for part in ("time", "m_present_time") if part in data.variables), None)
     if clock is None:
@@ -374,8 +375,11 @@ def _series(name: str, data: Any, pair: tuple[str, str], east: Array, north: Arr
         reports = np.arange(rows[end], rows[last] + 1)
         reports = reports[np.isfinite(east[reports]) & np.isfinite(north[reports])]
         fixes = [_nearest(np.isfinite(lon) & np.isfinite(lat), rows[row]) for row in (start, end)]
-        if reports.size and not np.isnat(time[fixes]).any():
-            found.append((fixes[0], fixes[1], int(reports[-1]), bottom))
+        last_report = int(reports[-1]) if reports.size else -1
+        before = found[-1][2] if found else -1
+        fresh = before < 0 or (east[last_report], north[last_report]) != (east[before], north[before])
+        if reports.size and fresh and not np.isnat(time[fixes]).any():
+            found.append((fixes[0], fixes[1], last_report, bottom))
         else:
             missing += 1
     require(
@@ -384,7 +388,9 @@ def _series(name: str, data: Any, pair: tuple[str, str], east: Array, north: Arr
         f"`{pair[0]}` at its end; give a CSV file of dives",
     )
     first, second, report = (np.array([row[n] for row in found], dtype=np.int64) for n in range(3))
-    notes = (f"{missing} dives of {name} are left out: no current is reported at their end",) if missing else ()
+    notes = (
+        (f"{missing} dives of {name} are left out: no new current is reported at their end",) if missing else ()
+    )
     ends = (lon[first], lat[first], lon[second], lat[second], time[first], time[second])
     bottoms = np.array([row[3] for row in found])
     error = np.full(len(found), ERROR)
