@@ -34,6 +34,8 @@ ANALYTIC = {
     "gyre, 12.42 h": (GYRE, [COARSE]),
     "wide swing, 900 s": (GYRE, ["flow.period=900.0", "flow.epsilon=0.45", COARSE]),
     "fast, 1,800 s": (GYRE, ["flow.period=1800.0", "flow.amplitude=0.5", COARSE]),
+    "tidal strait": ("tidal-strait", ["sampling.shape=[15,6,4]"]),
+    "moving vortex": ("moving-vortex", ["sampling.shape=[12,8,4]"]),
 }
 
 
@@ -151,7 +153,7 @@ def galicia(file: str) -> Scenario:
 def main() -> None:
     """Read the arguments, plan, fly, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--routes", type=int, default=34, help="in each of the flows given by formulas")
+    parser.add_argument("--routes", type=int, default=26, help="in each of the flows given by formulas")
     parser.add_argument("--washington", metavar="FILE", help="the real three-hourly file")
     parser.add_argument("--galicia", metavar="FILE", help="the real daily file")
     parser.add_argument("--only", action="append", help="a flow of the table; again for more")

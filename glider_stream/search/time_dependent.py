@@ -26,8 +26,10 @@ from .surfacing import Surfacing
 from .trade_off import TradeOff, none_within
 from .why_not import why_not
 
-MOST_BINS, FEWER_BINS = 240, 48
-"""The number of bins of time after departure in a search with bins: if the query asks for bins, and if not."""
+MOST_BINS = 240
+"""A search with bins of time ends so many bins after the departure."""
+PATIENCE = 48
+"""A search with bins that the query did not ask for also ends after so many bins without a node that is new."""
 LATER_FANS = 256
 """The second search, for a better path, uses this many fans; with few nodes they are enough for all ways."""
 TRIED_FANS = 32
@@ -91,29 +93,33 @@ class ClockPlanner(RoutePlanner):
         """Return the best of a path and of ways that reach some node later than the earliest way, with a note.
 
         The first bins are as long as a typical leg. They are halved until `LATER_FANS` fans are spent. If no path
-        is known, all ways in the first bins are followed, because a glider that the current carries away may come
-        back later and only then find a way on.
+        is known, all ways in the first bins are followed, as long as they come to nodes that are new: a glider
+        that the current carries away may come back later and only then find a way on.
         """
         durations = [float(label.row[TIME]) for label in search.labels if label.row is not None]
         if not durations or not self.assembly.changes or self.assembly.frozen:
             return path
         widest, departure = float(np.median(durations)), self.problem.departure
-        latest = departure + FEWER_BINS * widest
+        latest, patience = departure + MOST_BINS * widest, PATIENCE * widest
         fans = LATER_FANS if search.tally.fans <= LATER_FANS else min(TRIED_FANS, LATER_FANS)
         expansion = BoundedExpansion(self._expansion(ends), fans if path.found else math.inf)
-        best, width, finest, whole = path, widest, math.inf, True
+        best, width, finest, whole, until = path, widest, math.inf, True, departure
         while whole and width >= NARROWEST:
             below = (best.cost if search.by_cost else departure + best.travel_time) - BETTER
-            later = replace(aim, bins=width, latest=latest, below=below)
+            later = replace(aim, bins=width, latest=latest, patience=patience, below=below)
             # the reason for no path comes from the widest bins: only there were all ways surely followed
             found, again = self._first(ends, later, expansion, known=best.found or width < widest)
             best = found if found.found or (width == widest and not best.found) else best
             whole, expansion.most = again.whole, max(fans, expansion.found)
-            finest = width if whole else finest
+            if whole:
+                finest, until = (
+                    width,
+                    max(until, min(again.until, latest, self.problem.evaluator.flow.extent.t_hi)),
+                )
             width /= 2
         if not best.found:
-            until = moment(self.problem.departs, latest - departure)
-            looked = f"ways that come back to a node later were followed until {until}"
+            when = moment(self.problem.departs, until - departure)
+            looked = f"ways that come back to a node later were followed until {when}"
             return replace(best, why=f"{best.why}; {looked}, in bins of {finest:,.0f} s")
         return best if whole else replace(best, notes=(*best.notes, self._in_part(again, finest)))
 
