@@ -153,7 +153,7 @@ def galicia(file: str) -> Scenario:
 def main() -> None:
     """Read the arguments, plan, fly, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--routes", type=int, default=26, help="in each of the flows given by formulas")
+    parser.add_argument("--routes", type=int, default=34, help="in each of the flows given by formulas")
     parser.add_argument("--washington", metavar="FILE", help="the real three-hourly file")
     parser.add_argument("--galicia", metavar="FILE", help="the real daily file")
     parser.add_argument("--only", action="append", help="a flow of the table; again for more")

@@ -49,6 +49,7 @@ LONG = 10.0
 NODES = {2: 101, 3: 61}
 """Nodes along the longest side of the finer grid."""
 FEWEST = 21
+STILL = "FROZEN: the front meets the current of the departure, so this holds for no route with the clock running"
 LATEST = 3.0
 """The search ends at so many times of the straight way in still water."""
 
@@ -57,13 +58,15 @@ LATEST = 3.0
 class Bound:
     """The least `time` [s] from start to goal on the finer grid, its `error` [s] the difference to the coarser.
 
-    `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each; `wall_s` is not part of the answer.
+    `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each. `frozen`: the front moves in the current of
+    the departure, though the flow changes.
     """
 
     time: float
     error: float
     dimensions: int
     spacing: tuple[float, ...]
+    frozen: bool = False
 
     @property
     def least(self) -> float:
@@ -79,6 +82,7 @@ class Bound:
             "dimensions": self.dimensions,
             "spacing_m": list(self.spacing),
             "kind": "estimate" if self.dimensions == 2 else "bound",
+            **({"frozen": True} if self.frozen else {}),
         }
 
     def __str__(self) -> str:
@@ -87,6 +91,7 @@ class Bound:
         return (
             f"no route takes less than {span(self.least)}: a level set {where}, arrives after "
             f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s"
+            + (f"; {STILL}" if self.frozen else "")
         )
 
 
@@ -339,4 +344,5 @@ def bound(
     cure = "take a wider domain, or more nodes"
     require(math.isfinite(found[-1]), f"no front reaches the goal in {LATEST:g} times the straight way; {cure}")
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]
-    return Bound(found[1], error, size, tuple(float(step) for step in front.step))
+    still = problem.frozen and not is_steady(waters.flow)
+    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still)

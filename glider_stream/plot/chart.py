@@ -80,7 +80,8 @@ def plot_chart(
         if path.departs is not None:
             arrives = path.departs + timedelta(seconds=path.travel_time)
             text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
-        text += f"; {STILL}" if path.frozen else ""
+        still = path.frozen or (fronts is not None and problem.frozen and not is_steady(flow))
+        text += f"; {STILL}" if still else ""
         figure = new_figure(14.0, 8.6, f"{title}: {text}" if title else f"Route: {text}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves

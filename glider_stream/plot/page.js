@@ -37,6 +37,7 @@ const chooseTime = (time) => {
   chosen.time = clamp(time, 0, total);
   const here = glider(chosen.time);
   chooseLeg(here.leg);
+  if (data.current.times.length > 1) { paint(); redraw(); }
   placeMarks();
   markProfile();
   at("time").value = (1000 * chosen.time) / total;
@@ -55,7 +56,7 @@ const chooseLegAt = (n) => chooseTime(n <= 0 ? 0 : legs[Math.min(n, legs.length 
 const readPlace = (px, py) => {
   const x = worldX(px), y = worldY(py);
   if (!inside(x, y)) { at("place").textContent = ""; return; }
-  const ground = seabedAt(x, y), current = currentAt(x, y, chosen.level), said = [placeName(x, y)];
+  const ground = seabedAt(x, y), current = currentAt(x, y), said = [placeName(x, y)];
   if (ground === 0) said.push("land");
   else if (ground !== null) said.push(`seabed ${ground} m`);
   if (current && (ground === null || ground > data.current.depths[chosen.level]))

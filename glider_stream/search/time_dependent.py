@@ -121,21 +121,17 @@ class ClockPlanner(RoutePlanner):
             when = moment(self.problem.departs, until - departure)
             looked = f"ways that come back to a node later were followed until {when}"
             return replace(best, why=f"{best.why}; {looked}, in bins of {finest:,.0f} s")
-        return best if whole else replace(best, notes=(*best.notes, self._in_part(again, finest)))
-
-    def _in_part(self, search: LabelSearch, finest: float) -> str:
-        """Return the note on a path for which not all ways that reach a node later were followed."""
-        start = search.expansion.start
-        least = float((search.cost_left if search.by_cost else search.left)[start])
-        bound = f"{least:,.0f} J" if search.by_cost else f"{least:,.0f} s"
-        how = "in part" if math.isinf(finest) else f"in bins of {finest:,.0f} s"
-        return (
-            f"ways that come to a node later than at the soonest were followed {how}; a better one may exist, "
-            f"none takes less than {bound}; set query.bins (seconds) to follow all of them, which takes longer"
-        )
+        if whole:
+            return best
+        next_width = min(widest, finest / 2)
+        note = _in_part(search.tally.fans, expansion.found, finest, next_width, best.travel_time)
+        return replace(best, notes=(*best.notes, note))
 
     def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
-        """Return the cheapest paths from one point (3,) [m] to each of many, by one search."""
+        """Return the cheapest paths from one point (3,) [m] to each of many, by one search.
+
+        To several goals only the earliest way to each node is followed, so a path may exist that costs less.
+        """
         if len(goals) == 1:
             return [self.query(start, goals[0])]
         ends = self._ends(start, goals)
@@ -153,7 +149,7 @@ class ClockPlanner(RoutePlanner):
         return [self._path(search, expansion, first.get(n), ends, n) for n in range(len(goals))]
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
-        """Return the costs (n, m) of the cheapest paths from n points (3,) [m] to m others; else inf."""
+        """Return the costs (n, m) of the cheapest paths from n points (3,) [m] to m others; see `queries`."""
         return np.array([[path.cost for path in self.queries(start, goals)] for start in starts]).reshape(
             len(starts), len(goals)
         )
@@ -272,3 +268,18 @@ class ClockPlanner(RoutePlanner):
                 f"or take currents that reach further; else {why}"
             )
         return replace(path, why=why, why_not=reason.as_dict(), expanded=search.tally.share)
+
+
+def _in_part(first: int, later: int, finest: float, bins: float, seconds: float) -> str:
+    """Return the note on a path for which not all ways that come to a node later were followed.
+
+    `first` and `later` fans were found for the first ways and for later ways. All ways were followed in bins of
+    `finest` [s], inf if in none, but not in `bins` [s]. The path takes some `seconds`.
+    """
+    whole = "" if math.isinf(finest) else f" and all that come {finest:,.0f} s apart"
+    more = math.ceil(seconds / bins)
+    return (
+        f"the earliest ways to {first:,} nodes were followed, and {later:,} later ways{whole}, which lead to no "
+        f"better route; who comes to a node later may still arrive earlier: query.bins = {bins:.0f} follows all "
+        f"ways that come so many seconds apart, with up to {more:,} times the work"
+    )
