@@ -27,8 +27,8 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 CLOSE = 1.02
 """A route is close to its bound if it takes at most this multiple of it."""
-ROUNDING = 1e-3
-"""References and bounds are written with this many seconds."""
+ROUNDING = 0.02
+"""Closed forms are written with two digits, and a leg may end a centimetre short: this many seconds."""
 
 
 def routes(name: str, known: Reference) -> dict[str, Any]:
