@@ -100,9 +100,10 @@ def test_figures_and_page_say_so(still, tmp_path):
     told = texts_of(still.plot(path, chart=True))
     assert MARK.search(told)
     assert "as the route passes" not in told
-    told = texts_of(moving.plot(clock, chart=True))
+    told = texts_of(moving.plot(clock, chart=True, fronts=0.1))
     assert not MARK.search(told)
     assert "as the route passes" in told
+    assert "by the earliest way to each node" in told
     for opened, drawn, marked in ((still, path, True), (moving, clock, False)):
         opened.plot(drawn, tmp_path / "page.html")
         assert (MARK.search((tmp_path / "page.html").read_text(encoding="utf-8")) is not None) is marked

@@ -13,6 +13,7 @@ from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import Along, along
 from .canvas import (
+    EARLIEST,
     GREY,
     INK,
     PASSING,
@@ -91,7 +92,9 @@ def plot_chart(
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
         when = PASSING if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
-        every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
+        ways = "" if is_steady(flow) or problem.frozen else EARLIEST
+        # on a line of its own: a long title would run into the next panel's
+        every = "" if fronts is None else f",\nand what is reached every {fronts[1]:g} h{ways}"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
         line = _draw_route(ax, frame, rows, stops, clock)

@@ -85,6 +85,7 @@ data.current.depths.forEach((depth, n) => at("depth").add(new Option(`${depth} m
 at("depth").addEventListener("change", () => { chosen.level = +at("depth").value; paint(); redraw(); });
 if (fronts) {
   at("fronts-label").hidden = false;
+  at("ways").textContent = data.fronts.ways;
   const choices = [data.fronts.hours, 2 * data.fronts.hours, 4 * data.fronts.hours, 0];
   for (const hours of choices) at("fronts").add(new Option(hours ? `${+hours.toFixed(4)} h` : "none", hours));
   at("fronts").addEventListener("change", () => { chosen.every = +at("fronts").value; traceFronts(); redraw(); });

@@ -22,7 +22,7 @@ from ..kernels.flow import Flow, OceanGrid, cycle
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import STILL, length_unit, thinned, time_text, time_unit, when_text
+from .canvas import EARLIEST, STILL, length_unit, thinned, time_text, time_unit, when_text
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import sample_bottom
@@ -79,7 +79,9 @@ def save_page(
         ),
         "seabed": _seabed(terrain, frame),
         "legs": _legs(terrain, path),
-        "fronts": None if fronts is None else _fronts(*fronts),
+        "fronts": None
+        if fronts is None
+        else _fronts(*fronts, "" if is_steady(flow) or problem.frozen else EARLIEST),
     }
     text = page_text(held, held["title"])
     with replacing(File(file)) as temporary:
@@ -216,10 +218,11 @@ def _means(path: "Path") -> Array:
         return np.asarray((np.array(sums) / np.bincount(steps.leg, minlength=count)).T)
 
 
-def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:
+def _fronts(fronts: Fronts, hours: float, ways: str) -> dict[str, Any]:
     front_times(fronts, hours)  # raises InputError if it cannot be drawn
     return {
         "hours": hours,
+        "ways": ways,
         "last": float(fronts.time.max(initial=0.0)) / HOUR,
         "x": _numbers(fronts.x, 0),
         "y": _numbers(fronts.y, 0),
