@@ -72,9 +72,14 @@ def test_nothing_comes_in_through_the_sides(problem):
     waters = Shear(alone, 2)
     sides = Front(waters, 61, 20.0)
     assert (sides.axes[1][0], sides.axes[1][-1]) == (-60.0, 60.0)
-    # by hand: along the side the current is half as fast, and nowhere slower
-    fastest = waters.fastest
-    assert sides.arrival() > 150.0 / (fastest - 0.425)
+    # the best way in a current of y alone: to the side and back by the heading that is best at each y, with a price
+    # for each metre east, and along the side at that price
+    price = 1.0 / (waters.fastest - 0.425)
+    y, heading = np.linspace(0.0, 60.0, 401)[:, None], np.linspace(0.01, math.pi - 0.01, 2001)
+    east = waters.fastest * np.cos(heading) - 0.85 * (1.0 - y / 120.0)
+    per_metre = ((1.0 - price * east) / (waters.fastest * np.sin(heading))).min(axis=1)
+    best = 150.0 * price + 2.0 * 60.0 * per_metre.mean()
+    assert 0.98 * best < sides.arrival() <= best
 
 
 def test_a_strong_current_at_the_start_costs_no_sharpness(problem):
