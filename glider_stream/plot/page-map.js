@@ -26,7 +26,7 @@ const rgb = (hex) => [0, 1, 2].map((k) => parseInt(hex.slice(1 + 2 * k, 3 + 2 * 
 let speedPicture, landPicture;
 const paint = () => {
   showCurrent(chosen.level, chosen.time);
-  const stops = speedStops(), { u, v } = shown;
+  const stops = speedStops(), { u, v } = flowNow;
   speedPicture = painted(data.current.cells, (k) =>
     u[k] === null ? [0, 0, 0, 0] : [...mixed(stops, Math.hypot(u[k], v[k]) / 1000 / data.current.fastest), 255]);
   if (!data.seabed) return;

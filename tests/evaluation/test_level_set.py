@@ -72,7 +72,7 @@ def test_nothing_comes_in_through_the_sides(problem):
     waters = Shear(alone, 2)
     sides = Front(waters, 61, 20.0)
     assert (sides.axes[1][0], sides.axes[1][-1]) == (-60.0, 60.0)
-    # the best way in a current of y alone: along the side, at a price for each metre east, and there and back by the
+    # the best way in a current of y alone: along the side, at a price for each metre east; there and back by the
     # heading that is best at each y for that price
     price = 1.0 / (waters.fastest - 0.425)
     y, heading = np.linspace(0.0, 60.0, 401)[:, None], np.linspace(0.01, math.pi - 0.01, 2001)
