@@ -22,7 +22,7 @@ from ..kernels.flow import Flow, OceanGrid, cycle
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import EARLIEST, STILL, length_unit, thinned, time_text, time_unit, when_text
+from .canvas import STILL, length_unit, thinned, time_text, time_unit, when_text
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import sample_bottom
@@ -66,7 +66,7 @@ def save_page(
     frame = frame_of(problem, np.vstack([rows[:, 1:], path.legs[0].start, path.legs[-1].end]))
     levels = map_depths(position, frame, depths)
     held = {
-        **_words(flow, problem, path, title, fronts is not None),
+        **_words(flow, problem, path, title, fronts is not None and fronts[0].frozen),
         "box": [*frame.x, *frame.y],
         "unit": dict(zip(("size", "name"), length_unit(frame.x, frame.y), strict=True)),
         "lonlat": _lonlat(frame),
@@ -79,9 +79,7 @@ def save_page(
         ),
         "seabed": _seabed(terrain, frame),
         "legs": _legs(terrain, path),
-        "fronts": None
-        if fronts is None
-        else _fronts(*fronts, "" if is_steady(flow) or problem.frozen else EARLIEST),
+        "fronts": None if fronts is None else _fronts(*fronts),
     }
     text = page_text(held, held["title"])
     with replacing(File(file)) as temporary:
@@ -107,14 +105,13 @@ def page_text(held: dict[str, Any], title: str) -> str:
     return "".join([*pieces, rest])
 
 
-def _words(flow: Flow, problem: "Problem", path: "Path", title: str, fronts: bool) -> dict[str, Any]:
+def _words(flow: Flow, problem: "Problem", path: "Path", title: str, frozen: bool) -> dict[str, Any]:
     unit, name = time_unit(path.travel_time)
     when = AT_SLIDER if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
     legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
-    still = path.frozen or (fronts and problem.frozen and not is_steady(flow))
     return {
         "title": title or "Route",
-        "said": f"{legs}, {time_text(path.travel_time)}" + (f"; {STILL}" if still else ""),
+        "said": f"{legs}, {time_text(path.travel_time)}" + (f"; {STILL}" if path.frozen or frozen else ""),
         "when": when,
         "time": {"size": unit, "name": name, "total": path.travel_time},
         "departs": None if path.departs is None else path.departs.timestamp() * 1e3,
@@ -218,11 +215,11 @@ def _means(path: "Path") -> Array:
         return np.asarray((np.array(sums) / np.bincount(steps.leg, minlength=count)).T)
 
 
-def _fronts(fronts: Fronts, hours: float, ways: str) -> dict[str, Any]:
+def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:
     front_times(fronts, hours)  # raises InputError if it cannot be drawn
     return {
         "hours": hours,
-        "ways": ways,
+        "ways": fronts.ways,
         "last": float(fronts.time.max(initial=0.0)) / HOUR,
         "x": _numbers(fronts.x, 0),
         "y": _numbers(fronts.y, 0),
