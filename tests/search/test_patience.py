@@ -16,7 +16,7 @@ LEG, BIN = 30.0, 1.0
 class Chain:
     """Places one after another, a leg apart, and a loop at the start that never ends."""
 
-    nodes, start, spent = 5, 0, False
+    nodes, start, spent, chosen = 5, 0, False, slice(None)
 
     def __init__(self, *, reaches):
         self.places = np.array([[100.0 * n, 0.0, -100.0 * (n % 2)] for n in range(self.nodes)])
@@ -39,8 +39,8 @@ class NoBound:
 
     sink = 1.0
 
-    def between(self, place):
-        return np.zeros(Chain.nodes)
+    def between(self, place, others):
+        return np.zeros(Chain.nodes)[others]
 
     def remaining(self, goals, cost):
         return np.zeros(Chain.nodes), np.zeros(Chain.nodes)
