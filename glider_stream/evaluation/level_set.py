@@ -7,12 +7,10 @@ Runge-Kutta 3). In three dimensions glide angles lie on the polar or between two
 routes of equal yos, the glider moves at its best horizontal speed in the mean current of the depths of a yo: that
 is what yos meet from one surfacing to the next, and an estimate, since a current varies along a yo.
 
-- Start. On a finer grid around the start V(., 0) is the time tau [s] that a glider in still water needs from
-  the start, as sqrt(tau^2 + TAU^2) - TAU: it moves alike, and has no tip. A glider from the start itself needs
-  tau / (1 + m / Vh) or more to get out of the set within tau = TAU, with m the greatest current there; after
-  that the front tells when each place near the start is reached. The grid of all water goes on from these times:
-  V(goal, t) tells the set of places that a glider has reached when it begins and from which it is at the goal
-  at t.
+- Start. The front does not begin at a point, which no grid shows, but at the set that a glider needs tau [s] to
+  cross in still water. V is that time, as sqrt(tau^2 + SOFT^2) - SOFT with SOFT = tau: it moves alike, and has no
+  tip. Near the start the current is c, and off by m [m/s] at the most. So after s = tau / (1 + m / Vh) a glider
+  from the start is still within tau of the place to which c alone has carried it. There the front begins, at s.
 - Surface and floor. The field goes on beyond both as its mirror image: a path there, folded back, dives where it
   climbed. Gliders may so hold their depth there.
 - Sides. Nothing comes in through the sides of the box. Land is not entered.
@@ -22,7 +20,7 @@ difference between two grids estimates the scheme's.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from ..base.arrays import Array, Bools
+from ..base.arrays import Array
 from ..base.clock import span
 from ..base.settings import require
 from ..kernels.flow import velocities
@@ -39,15 +37,9 @@ from ..roadmap.problem import Problem
 from ..water.inspect import is_steady
 
 CELLS = 4.0
-"""The front begins at a set of so many cells of the grid around the start."""
-BEGIN_FINER = 3
-"""The grid on which the front begins is so many times finer."""
-SURE = 0.6
-"""The other grid goes on from where the front was after this share of its time on the finer one."""
-WIDE = 7.0
-"""It reaches so many cells of the other grid to each side of the start."""
-AROUND = 21
-"""The currents around an end are read at so many places along each dimension."""
+"""The front begins at a set of so many cells of the finer grid around the start."""
+NEAR, PARTS = 1.25, 5
+"""The current near the start is read within NEAR times tau of a glider that drifts, at PARTS times."""
 COURANT = 0.6
 SLOPES = 512
 HEIGHTS = 25
@@ -57,6 +49,7 @@ LONG = 10.0
 NODES = {2: 101, 3: 61}
 """Nodes along the longest side of the finer grid."""
 FEWEST = 21
+STILL = "FROZEN: the front meets the current of the departure, so this holds for no route with the clock running"
 LATEST = 3.0
 """The search ends at so many times of the straight way in still water."""
 
@@ -65,13 +58,15 @@ LATEST = 3.0
 class Bound:
     """The least `time` [s] from start to goal on the finer grid, its `error` [s] the difference to the coarser.
 
-    `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each; `wall_s` is not part of the answer.
+    `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each. `frozen`: the front moves in the current of
+    the departure, though the flow changes.
     """
 
     time: float
     error: float
     dimensions: int
     spacing: tuple[float, ...]
+    frozen: bool = False
 
     @property
     def least(self) -> float:
@@ -87,6 +82,7 @@ class Bound:
             "dimensions": self.dimensions,
             "spacing_m": list(self.spacing),
             "kind": "estimate" if self.dimensions == 2 else "bound",
+            **({"frozen": True} if self.frozen else {}),
         }
 
     def __str__(self) -> str:
@@ -95,6 +91,7 @@ class Bound:
         return (
             f"no route takes less than {span(self.least)}: a level set {where}, arrives after "
             f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s"
+            + (f"; {STILL}" if self.frozen else "")
         )
 
 
@@ -190,33 +187,66 @@ def _hull(polar: Any, way: int, share: Array) -> tuple[Array, float, float]:
     return support, float(level.max()), float(sink.max())
 
 
-class _Grid:
-    """Even nodes of a box from `lo` to `hi` [m], `shape` of them along each dimension, that move a front."""
+class Front:
+    """One run on one grid, from the start, or in a steady flow from the end in the weaker current."""
 
-    def __init__(self, waters: Waters, lo: Array, hi: Array, shape: tuple[int, ...], backward: bool) -> None:
-        """With `backward` the front comes from the goal, against the current."""
-        self.waters, self.shape, self.backward = waters, shape, backward
-        self.axes = [np.linspace(a, b, n) for a, b, n in zip(lo, hi, shape, strict=True)]
+    def __init__(self, waters: Waters, nodes: int, tau: float) -> None:
+        """With so many nodes along the longest side; the front begins as the set within `tau` [s]."""
+        self.waters, self.tau = waters, tau
+        span_of = waters.hi - waters.lo
+        self.shape = tuple(max(9, 1 + round(float(side / span_of.max()) * (nodes - 1))) for side in span_of)
+        if len(span_of) == 3:  # depth matters as much as x and y, though the box is flat
+            self.shape = (*self.shape[:2], max(self.shape[2], 1 + (nodes - 1) // 2))
+        self.axes = [np.linspace(a, b, n) for a, b, n in zip(waters.lo, waters.hi, self.shape, strict=True)]
         self.step = np.array([axis[1] - axis[0] for axis in self.axes])
-        self.nodes = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, len(shape))
-        self.water = ~waters.land(self.nodes).reshape(shape)
+        grid = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
+        self.nodes = grid.reshape(-1, len(self.shape))
+        leaves = [self._leaves(end, sign) for end, sign in zip(waters.ends, (1.0, -1.0), strict=True)]
+        self.backward = waters.steady and leaves[1][0] > leaves[0][0]
+        self.far = waters.ends[0 if self.backward else 1]
+        self.began, self.source = leaves[1 if self.backward else 0]
+        self.water = ~waters.land(self.nodes).reshape(self.shape)
 
-    def still_water_time(self, source: Array) -> Array:
-        """Time [s] from a point to each node in still water."""
-        return self.waters.still_water_time(self.nodes - source).reshape(self.shape)
+    def _leaves(self, end: Array, sign: float) -> tuple[float, Array]:
+        """Return when the front begins [s], and the place to which the current has carried `end` by then.
 
-    def moving(self, values: Array, since: float) -> Iterator[tuple[float, float, Array]]:
-        """Yield the time [s] after each step, the step's length [s] and the values of the front then."""
-        waters, current = self.waters, self._current(since)
+        `sign` is -1 where the front moves against the current, from the goal.
+        """
+        waters, across = self.waters, np.zeros(end.size)
+        across[:2] = waters.current(end[None], 0.0)[0]
+        seen = []
+        for share in np.linspace(0.0, 1.0, PARTS):
+            away = self.nodes - end - sign * share * self.tau * across
+            near = self.nodes[waters.still_water_time(away) <= NEAR * self.tau]
+            seen.append(waters.current(np.vstack([near, end]), share * self.tau))
+        known = np.vstack(seen)
+        carried = 0.5 * (known.min(axis=0) + known.max(axis=0))
+        off = float(np.hypot(*(known - carried).T).max())
+        began = self.tau / (1.0 + off / waters.fastest)
+        place = end.copy()
+        place[:2] += sign * began * carried
+        return began, place
+
+    def arrival(self) -> float:
+        """When the far end is reached [s], as the module says; inf where that is never."""
+        waters, tau = self.waters, self.waters.still_water_time(self.nodes - self.source).reshape(self.shape)
+        values, now = np.hypot(tau, self.tau) - self.tau, self.began
+        latest = LATEST * float(waters.still_water_time((waters.ends[1] - waters.ends[0])[None])[0])
+        current = self._current(now)
         most = [waters.fastest, waters.fastest, waters.steepest][: len(self.shape)]
-        while True:
+        left = math.inf
+        while now < latest:
             if not waters.steady:
-                current = self._current(since)
+                current = self._current(now)
             speeds = [most[n] + np.abs(part) for n, part in enumerate(current)]
             rate = sum(float(speed.max()) / step for speed, step in zip(speeds, self.step, strict=True))
-            values = self._moved(values, COURANT / rate, current, speeds)
-            since += COURANT / rate
-            yield since, COURANT / rate, values
+            ahead = COURANT / rate
+            values = self._moved(values, ahead, current, speeds)
+            now, before, left = now + ahead, left, self._left(values)
+            if left <= self.tau:
+                touched = now - ahead * (self.tau - left) / max(before - left, 1e-12)
+                return float(touched)
+        return math.inf
 
     def _current(self, since: float) -> list[Array]:
         """The current along each dimension at the nodes; against it where the front comes from the goal."""
@@ -243,101 +273,24 @@ class _Grid:
             flux = flux + current[n] * middle[n] - 0.5 * speeds[n] * (right - left)
         return np.asarray(flux)
 
-    def rim(self) -> Bools:
-        """A mask of the nodes at sides of the box that are not sides of the water."""
-        mask = np.zeros(self.shape, np.bool_)
-        for n, axis in enumerate(self.axes):
-            along = np.moveaxis(mask, n, 0)
-            along[0] |= axis[0] > self.waters.lo[n]
-            along[-1] |= axis[-1] < self.waters.hi[n]
-        return mask
-
-
-class Front:
-    """One run on one grid, from the start, or in a steady flow from the end in the weaker current."""
-
-    def __init__(self, waters: Waters, nodes: int, tau: float) -> None:
-        """With so many nodes along the longest side; the front begins within `tau` [s]."""
-        self.waters, self.tau = waters, tau
-        span_of = waters.hi - waters.lo
-        shape = tuple(max(9, 1 + round(float(side / span_of.max()) * (nodes - 1))) for side in span_of)
-        if len(span_of) == 3:  # depth matters as much as x and y, though the box is flat
-            shape = (*shape[:2], max(shape[2], 1 + (nodes - 1) // 2))
-        slower = [self._quickening(end) for end in waters.ends]
-        backward = waters.steady and slower[1] < slower[0]
-        self.grid = _Grid(waters, waters.lo, waters.hi, shape, backward)
-        self.source, self.far = waters.ends[::-1] if backward else waters.ends
-        self.quickening = slower[1] if backward else slower[0]
-
-    def _quickening(self, end: Array) -> float:
-        """1 + m / Vh, m the greatest current within tau of an end."""
-        waters = self.waters
-        reach = 1.5 * self.tau * np.array([waters.fastest, waters.fastest, waters.steepest][: len(end)])
-        near = np.stack(np.meshgrid(*(np.linspace(-r, r, AROUND) for r in reach), indexing="ij"), axis=-1)
-        near = near.reshape(-1, len(end))
-        points = end + near[waters.still_water_time(near) <= 1.5 * self.tau]
-        points = np.clip(np.vstack([points, end]), waters.lo, waters.hi)
-        return 1.0 + float(np.hypot(*waters.current(points, 0.0).T).max()) / waters.fastest
-
-    def arrival(self) -> float:
-        """When the far end is reached [s], as the module says; inf where that is never."""
-        latest = LATEST * float(self.waters.still_water_time((self.far - self.source)[None])[0])
-        reached, within = self._begun()
-        values = np.hypot(reached, within) - within
-        left = math.inf
-        for now, ahead, moved in self.grid.moving(values, within):
-            before, left = left, self._left(moved, within)
-            if left <= within:
-                return float(now - ahead * (within - left) / max(before - left, 1e-12))
-            if now >= latest:
-                return math.inf
-        raise AssertionError("the front moves without end")
-
-    def _begun(self) -> tuple[Array, float]:
-        """When a glider from the source can be at each node [s], right up to the second value [s]; beyond, later.
-
-        A front on a finer grid around the source tells, until it has come so far that this grid can follow it.
-        """
-        waters, wide = self.waters, WIDE * self.grid.step
-        lo, hi = np.maximum(self.source - wide, waters.lo), np.minimum(self.source + wide, waters.hi)
-        shape = tuple(1 + max(8, math.ceil(n)) for n in BEGIN_FINER * (hi - lo) / self.grid.step)
-        fine = _Grid(waters, lo, hi, shape, self.grid.backward)
-        tau, rim, edge = fine.still_water_time(self.source), fine.rim(), (math.sqrt(2.0) - 1.0) * self.tau
-        values, now = np.hypot(tau, self.tau) - self.tau, 0.0
-        begins = self.tau / self.quickening
-        reached = np.where(tau <= self.tau, tau / self.quickening, math.inf)
-        for after, ahead, moved in fine.moving(values, 0.0):
-            if (moved[rim] <= edge).any() or (moved <= edge).all():
-                break
-            new = (moved <= edge) & ~np.isfinite(reached)
-            share = (values[new] - edge) / np.maximum(values[new] - moved[new], 1e-12)
-            reached[new] = begins + now + ahead * share
-            values, now = moved, after
-        beyond = np.sqrt(np.maximum((values + self.tau) ** 2 - self.tau**2, 0.0)) - self.tau
-        reached = np.where(np.isfinite(reached), reached, begins + now + beyond)
-        inside = np.clip(self.grid.nodes, lo, hi)
-        read = map_coordinates(reached, ((inside - lo) / fine.step).T, order=1, mode="nearest")
-        away = waters.still_water_time(self.grid.nodes - inside)
-        return (read + away).reshape(self.grid.shape), SURE * (begins + now)
-
-    def _left(self, values: Array, within: float) -> float:
+    def _left(self, values: Array) -> float:
         """tau [s] at the far end; 0 once V has sunk below its least value."""
-        grid = self.grid
-        place = [[(c - axis[0]) / step] for c, axis, step in zip(self.far, grid.axes, grid.step, strict=True)]
-        first = [min(max(int(p[0]) - 4, 0), max(n - 10, 0)) for p, n in zip(place, grid.shape, strict=True)]
+        place = [[(c - axis[0]) / step] for c, axis, step in zip(self.far, self.axes, self.step, strict=True)]
+        first = [min(max(int(p[0]) - 4, 0), max(n - 10, 0)) for p, n in zip(place, self.shape, strict=True)]
         patch = values[tuple(slice(f, f + 10) for f in first)]
         at = [[p[0] - f] for p, f in zip(place, first, strict=True)]
         value = float(map_coordinates(patch, at, order=3, mode="mirror")[0])
-        return math.sqrt(max((max(value, -within) + within) ** 2 - within**2, 0.0))
+        return math.sqrt(max((max(value, -self.tau) + self.tau) ** 2 - self.tau**2, 0.0))
 
 
 def _one_sided(values: Array, axis: int, step: float, mirror: bool) -> tuple[Array, Array]:
     """Slopes from the left and from the right, by WENO5 (Jiang and Peng 2000)."""
     along = np.moveaxis(values, axis, -1)
-    width = [(0, 0)] * (along.ndim - 1) + [(3, 3)]
-    padded = np.pad(along, width, mode="reflect") if mirror else np.pad(
-        along, width, mode="reflect", reflect_type="odd"
-    )  # fmt: skip
+    before, after = along[..., 3:0:-1], along[..., -2:-5:-1]
+    if not mirror:  # higher beyond the side than on it, so that no front comes in
+        before = along[..., :1] + np.abs(along[..., :1] - before)
+        after = along[..., -1:] + np.abs(along[..., -1:] - after)
+    padded = np.concatenate([before, along, after], axis=-1)
     rises = np.diff(padded, axis=-1) / step
     count = along.shape[-1]
     part = [rises[..., n : n + count] for n in range(6)]
@@ -382,13 +335,14 @@ def bound(
     finest = NODES[size] if nodes is None else nodes
     require(finest >= FEWEST, f"`nodes` must be at least {FEWEST}; got {nodes}")
     waters = Waters(problem, size)
-    tau = CELLS / BEGIN_FINER * float((waters.hi - waters.lo).max()) / (finest - 1) / waters.fastest
+    tau = CELLS * float((waters.hi - waters.lo).max()) / (finest - 1) / waters.fastest
     found = []
     for count in (1 + (finest - 1) // 2, finest):
         front = Front(waters, count, tau)
         found.append(front.arrival())
-        progress(f"a grid of {' x '.join(map(str, front.grid.shape))}: {found[-1]:,.0f} s")
+        progress(f"a grid of {' x '.join(map(str, front.shape))}: {found[-1]:,.0f} s")
     cure = "take a wider domain, or more nodes"
     require(math.isfinite(found[-1]), f"no front reaches the goal in {LATEST:g} times the straight way; {cure}")
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]
-    return Bound(found[1], error, size, tuple(float(step) for step in front.grid.step))
+    still = problem.frozen and not is_steady(waters.flow)
+    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still)

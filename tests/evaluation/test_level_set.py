@@ -33,7 +33,7 @@ def exact(problem):
     return (-b + math.sqrt(b * b + a * (way @ way))) / a
 
 
-@pytest.mark.parametrize(("dimensions", "nodes", "share"), [(2, 51, 0.003), (3, 23, 0.006)])
+@pytest.mark.parametrize(("dimensions", "nodes", "share"), [(2, 51, 0.02), (3, 23, 0.06)])
 def test_in_an_even_current_it_is_the_closed_form_from_below(problem, dimensions, nodes, share):
     found = bound(problem, dimensions, nodes)
     best = exact(problem)
@@ -52,10 +52,43 @@ def test_the_front_does_not_enter_land(problem):
     waters = Waters(problem, 2)
     front = Front(waters, 41, 60.0)
     free = front.arrival()
-    across = np.abs(front.grid.nodes @ np.array([1.0, -1.0])) < 40.0  # a wall across the way, with a gap far off
-    wall = across & (front.grid.nodes[:, 0] < 200.0)
-    front.grid.water &= ~wall.reshape(front.grid.shape)
+    across = np.abs(front.nodes @ np.array([1.0, -1.0])) < 40.0  # a wall across the way, with a gap far off
+    wall = across & (front.nodes[:, 0] < 200.0)
+    front.water &= ~wall.reshape(front.shape)
     assert front.arrival() > 1.05 * free
+
+
+def test_nothing_comes_in_through_the_sides(problem):
+    """Where the current is weakest beside the box, a front that went round there would be too early."""
+    narrow = Uniform(-0.85, 0.0, y=(-60.0, 60.0)).kernel(HEIGHTS)
+
+    class Shear(Waters):
+        def current(self, at, since):
+            uv = super().current(at, since)
+            return uv * (1.0 - np.minimum(np.abs(at[:, 1]) / 120.0, 1.0))[:, None]
+
+    alone = replace(problem, start=np.array([0.0, 0.0, 0.0]), goal=np.array([150.0, 0.0, 0.0]))
+    alone = replace(alone, evaluator=replace(alone.evaluator, flow=narrow))
+    waters = Shear(alone, 2)
+    sides = Front(waters, 61, 20.0)
+    assert (sides.axes[1][0], sides.axes[1][-1]) == (-60.0, 60.0)
+    # the best way in a current of y alone: along the side, at a price for each metre east; there and back by the
+    # heading that is best at each y for that price
+    price = 1.0 / (waters.fastest - 0.425)
+    y, heading = np.linspace(0.0, 60.0, 401)[:, None], np.linspace(0.01, math.pi - 0.01, 2001)
+    east = waters.fastest * np.cos(heading) - 0.85 * (1.0 - y / 120.0)
+    per_metre = ((1.0 - price * east) / (waters.fastest * np.sin(heading))).min(axis=1)
+    best = 150.0 * price + 2.0 * 60.0 * per_metre.mean()
+    assert 0.98 * best < sides.arrival() <= best
+
+
+def test_a_strong_current_at_the_start_costs_no_sharpness(problem):
+    """The front begins where the current has carried the start, so an even current leaves nothing to guess."""
+    waters = Waters(problem, 2)
+    for nodes in (31, 61):
+        front = Front(waters, nodes, 60.0)
+        assert front.began == pytest.approx(60.0)
+        assert front.source - waters.ends[0] == pytest.approx(60.0 * np.array([0.3, -0.1]))
 
 
 def test_long_routes_are_bounded_in_two_dimensions(problem):
