@@ -43,7 +43,7 @@ from .scenario import (
 from .search.answer import Ends, best_path, front, planner_of
 from .search.assembly import Assembly, RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
-from .search.flown_on import check_plan, flown_on, located
+from .search.flown_on import check_currents, check_plan, flown_on, located
 from .search.least_time import GreatestSpeeds, least_cost
 from .search.path import SURFACE, Origin, Path, load_path
 from .search.query import Planner
@@ -60,6 +60,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+LATEST_FIX = 366 * 86_400.0
+"""A fix is at most so long [s] after its plan's departure; seconds since 1970, say, are not the flow's."""
 NEAR = 0.1
 """A replan with the clock running searches the nodes on ways at most this share longer than the best way, by the
 legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands."""
@@ -283,7 +285,9 @@ class OpenedScenario:
             len(old.legs) > 0, "the plan holds no leg, so nothing is left to be planned anew; plan a route first"
         )
         require(0 <= tolerance < np.inf, f"the tolerance must be from 0 % up; got {tolerance:.0%}")
-        before, since = self._at_fix(old, time)
+        # a newer forecast is often written over the older one, whose currents are then no more known
+        renewed = currents is not None and old.origin is not None
+        before, since = self._at_fix(old, time, renewed)
         place = self._point((*fix, 0.0))
         now = self if currents is None else self._renewed(currents, before, place, old.goal)
         leaves = now.problem if currents is not None else before
@@ -339,11 +343,12 @@ class OpenedScenario:
         kept = self._kept.get("guide of nodes")
         return kept if isinstance(kept, OpenedRoadmap) else None
 
-    def _at_fix(self, old: Path, time: Moment) -> tuple[Problem, float]:
+    def _at_fix(self, old: Path, time: Moment, renewed: bool) -> tuple[Problem, float]:
         """Return the problem for gliders that leave at a fix, and the time [s] since the departure of an old
         plan.
 
-        InputError if the plan is not one of this problem, or if the fix is before its departure.
+        InputError if the plan is not one of this problem, or if the fix is before its departure. `renewed`: the
+        currents of the plan may have changed since.
         """
         problem = self.problem
         if old.origin is not None:
@@ -354,14 +359,21 @@ class OpenedScenario:
         began = problem.departure if old.departure is None else old.departure
         began = began if old.origin is None else old.origin.departure
         leaving = problem.leaving(began - problem.departure)
-        check_moment(leaving, "the plan's departure", "give the currents that it was planned with")
         check_plan(old, leaving)
+        if not renewed:
+            check_moment(leaving, "the plan's departure", "give the currents that it was planned with")
+            check_currents(old, leaving)
         since = seconds(time, problem, "fix") - began
         if since < 0:
             left = f"{began:,.0f} s" if leaving.departs is None else moment(leaving.departs, 0.0)
             require(
                 False, f"the fix's time {time} is before the plan's departure, {left}; give the time of the fix"
             )
+        require(
+            since <= LATEST_FIX,
+            f"the fix's time {time} is {since / 86_400:,.0f} days after the plan's departure, more than "
+            f"{LATEST_FIX / 86_400:g}; give a date, or seconds as the scenario counts them",
+        )
         return leaving.leaving(since), since
 
     def _radius(self, goal: Array, arrival_radius: float | None) -> float:

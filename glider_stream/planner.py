@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .base.arrays import Array
 from .base.checks import Range
-from .base.output import check_output, replacing
+from .base.output import check_apart, check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
@@ -336,6 +336,7 @@ def currents(
 
     if output is not None:
         check_currents_output(output)
+        check_apart(output, [dives])
     errors = SensorErrors(fix=fix_error, speed=speed_error, heading=math.radians(heading_error))
     found = dive_currents(dives, columns, declination=declination, attack=attack, errors=errors)
     if output is not None:
@@ -597,9 +598,9 @@ def assimilate(
     from .water.mapping.assimilate import assimilate
     from .water.ocean import read_currents
 
-    _check_map(output, members)
-    measured = _measurements(dives, points, drifters, columns)
     some = [forecast] if isinstance(forecast, (str, File)) else list(forecast)
+    _check_map(output, members, [*some, *dives, *points, *drifters])
+    measured = _measurements(dives, points, drifters, columns)
     found = assimilate(read_currents(some, names), measured, scales, kernel=kernel, inducing=inducing, seed=seed)
     _write_map(found, output, members, seed)
     return found
@@ -636,7 +637,7 @@ def map_currents(
     """
     from .water.mapping.mapped import map_currents
 
-    _check_map(output, members)
+    _check_map(output, members, [*dives, *points, *drifters])
     measured = _measurements(dives, points, drifters, columns)
     more: dict[str, Any] = {"kernel": kernel, "inducing": inducing, "seed": seed}
     found = map_currents(measured, lon, lat, spacing, depth, times, scales, **more)
@@ -644,11 +645,13 @@ def map_currents(
     return found
 
 
-def _check_map(output: str | File | None, members: int) -> None:
+def _check_map(output: str | File | None, members: int, inputs: Sequence[str | File]) -> None:
     require(members >= 0, f"`members` must be 0 or more; got {members}")
     require(members == 0 or output is not None, "`members` need an output file; name one")
     if output is not None:
-        check_output(output)
+        for file in [output, *([members_file(output)] if members else [])]:
+            check_output(file)
+            check_apart(file, inputs)
 
 
 def _measurements(

@@ -5,7 +5,7 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from .errors import InputError, Unwritable
@@ -38,6 +38,14 @@ def check_output(path: str | Path) -> None:
         tempfile.TemporaryFile(dir=path.resolve().parent).close()
     except OSError as error:
         raise InputError(f"the output {path} cannot be written: {error.strerror}; name another") from None
+
+
+def check_apart(output: str | Path, inputs: Iterable[str | Path]) -> None:
+    """Raise InputError if an output would be written over an input, perhaps by another name of the same file."""
+    for file in inputs:
+        with contextlib.suppress(OSError):  # one of them is not there yet
+            same = Path(output).samefile(file)
+            require(not same, f"the output {output} is the input {file}, which would be lost; name another")
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.settings import require
 from ..base.table import find_columns, read_table
-from ..vehicle.averaged_current import dead_reckoned, horizontal_speed
+from ..vehicle.averaged_current import FASTEST, dead_reckoned, horizontal_speed
 from ..vehicle.calibration.dives import MOST_DIVES
 from ..water.frame import LocalFrame
 from ..water.ocean.opening import opened
@@ -49,6 +49,8 @@ GLIDING = 0.5
 """In a track, at least this share of the samples of a dive must be a steady glide, for a speed to be known."""
 LONGEST_DIVE = 30 * 86_400.0
 """No dive lasts longer [s]; if two fixes do, some fixes between them are missing."""
+DEEPEST = 11_000.0
+"""No sea is deeper [m]."""
 EARTH = {"lat": 90.0, "lon": 540.0}
 
 
@@ -113,6 +115,16 @@ def read_dive_records(
         f"name a column by --column WHAT=COLUMN{listed}",
     )
     assert way is not None
+    require(
+        "heading" in way or declination == 0,
+        f"the declination is added to headings; {path.name} gives {' and '.join(way)}: leave it out",
+    )
+    for what, needs in (("drift_east", "drift_north"), ("drift_north", "drift_east"), ("drift_east", "surface")):
+        require(
+            what not in found or needs in found,
+            f"{path.name} has `{found.get(what)}` without a column `{needs}`, so it cannot be used; add it by "
+            f"--column {needs}=COLUMN, or take `{found.get(what)}` out",
+        )
     at = {what: header.index(column) for what, column in found.items()}
     return [
         _dive(f"line {line} of {path.name}", {what: row[n].strip() for what, n in at.items()}, way, declination)
@@ -134,6 +146,12 @@ def _dive(where: str, row: Mapping[str, str], way: Sequence[str], declination: f
         require(fits, f"{where}: {what} = {value:g} is no such angle in degrees; mend it")
         return value
 
+    def bounded(what: str, least: float, most: float, unit: str) -> float:
+        value = number(what)
+        fits = least <= value <= most
+        require(fits, f"{where}: {what} = {value:g} must be from {least:g} to {most:g} {unit}; mend it")
+        return value
+
     def pair(*names: str) -> Array | None:
         return np.array([number(name) for name in names]) if all(row.get(name) for name in names) else None
 
@@ -143,7 +161,8 @@ def _dive(where: str, row: Mapping[str, str], way: Sequence[str], declination: f
     if way == ("east", "north"):
         through = np.array([number("east"), number("north")])
     elif way == ("heading", "horizontal"):
-        bearing, speed = math.radians(number("heading") + declination), number("horizontal")
+        bearing = math.radians(bounded("heading", -360.0, 360.0, "degrees") + declination)
+        speed = bounded("horizontal", 0.0, FASTEST, "m/s")
         below = ended - began - (number("surface") if row.get("surface") else 0.0)
         through = speed * below * np.array([math.sin(bearing), math.cos(bearing)])
     else:
@@ -159,7 +178,7 @@ def _dive(where: str, row: Mapping[str, str], way: Sequence[str], declination: f
         surface=number("surface") if row.get("surface") else 0.0,
         drift=pair("drift_east", "drift_north") if row.get("surface") else None,
         recorded=pair("recorded_east", "recorded_north"),
-        max_depth=number("max_depth") if row.get("max_depth") else None,
+        max_depth=bounded("max_depth", 0.0, DEEPEST, "m") if row.get("max_depth") else None,
     )
 
 

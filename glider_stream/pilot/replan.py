@@ -17,6 +17,7 @@ from ..search.assembly import RoutePlanner
 from ..search.flown_on import FlownOn, GoodUntil, Stop, good_until, next_leg
 from ..search.path import SURFACE, Leg, Path
 from ..water.frame import true_north
+from ..water.mapping.measured import FASTEST
 
 TOLERANCE = 0.05
 """An old list is good as long as flying it on costs at most this share more in all than the new plan."""
@@ -249,6 +250,8 @@ def compared(
     The dive is that of the old plan that ends by the fix, moved so that it ends there. `waters`: problems that
     leave at the fix, of which the first that knows the time of the dive is read.
     """
+    speed = float(np.hypot(*measured)) if measured.shape == (2,) else math.nan
+    require(speed <= FASTEST, f"`dac` must be two numbers [m/s], together at most {FASTEST:g}; got {measured}")
     first = next_leg(old, since)
     begin = first - 1
     while begin > 0 and old.legs[begin].start[2] < -SURFACE:

@@ -27,6 +27,7 @@ ROUNDED = 1e-6
 """Depths in a plan's file are rounded by less than this [m]."""
 FLOWN_BESIDE = 1.5
 """The first leg of a plan may end this many tolerances beside its stop; else it was planned in another water."""
+ANOTHER = "give the scenario or the roadmap of the plan, or plan again"
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,12 @@ def located(path: Path, assembly: Assembly) -> Path:
 def check_plan(path: Path, problem: Problem) -> None:
     """Raise InputError unless a plan can be one of this problem, which leaves when the plan does.
 
-    Its places must lie in the box, its speeds must be those of the vehicle, and its first leg, flown again, must
-    end where the plan says.
+    Its places must lie in the box, and its speeds must be those of the vehicle.
     """
-    cure = "give the scenario or the roadmap of the plan, or plan again"
+    cure = ANOTHER
     z = np.array([[leg.start[2], leg.end[2]] for leg in path.legs])
-    fits = bool((z <= 0).all() and (z >= problem.lo[2] - ROUNDED).all())
+    require(bool((z <= ROUNDED).all()), f"the plan goes {z.max():g} m above the surface: it was changed; {cure}")
+    fits = bool((z >= problem.lo[2] - ROUNDED).all())
     require(fits, f"the plan goes to {-z.min():g} m, below the depths of this scenario: it is another's; {cure}")
     angle, speed = (np.array([getattr(leg, name) for leg in path.legs]) for name in ("glide_angle", "speed"))
     expected = Air(problem.evaluator).speed(np.abs(angle), angle > 0)
@@ -95,6 +96,13 @@ def check_plan(path: Path, problem: Problem) -> None:
         n, shown = int(odd[0]), math.degrees(angle[odd[0]])
         speeds = f"leg {n + 1} of the plan glides {speed[n]:.3f} m/s at {shown:.1f} degrees"
         require(False, f"{speeds}, this vehicle {expected[n]:.3f}: the plan is another vehicle's; {cure}")
+
+
+def check_currents(path: Path, problem: Problem) -> None:
+    """Raise InputError unless the first leg of a plan, flown again, ends where the plan says.
+
+    The problem leaves when the plan does.
+    """
     leg = path.legs[0]
     rows = problem.evaluator.trace(leg.start, _edge(leg, leg.duration, leg.heading), problem.departure)
     off = math.dist(rows[-1, 1:], leg.end)
@@ -102,7 +110,7 @@ def check_plan(path: Path, problem: Problem) -> None:
     require(
         off <= most,
         f"leg 1 of the plan, flown in these currents, ends {off:,.0f} m from where the plan says: the plan is "
-        f"another scenario's, or the currents have changed since; {cure}; name newer currents by --currents",
+        f"another scenario's, or the currents have changed since; {ANOTHER}; name newer currents by --currents",
     )
 
 
@@ -238,8 +246,10 @@ def good_until(flown: FlownOn, cost: float, left: Callable[[Stop], float], toler
         middle = (low + high) // 2
         known[middle] = extra(stops[middle])
         low, high = (middle, high) if known[middle] <= tolerance else (low, middle)
-    whole = low == len(stops) - 1 and not flown.why
-    beyond = "" if whole else flown.why
+    whole = len(stops) > 1 and low == len(stops) - 1 and not flown.why
+    beyond = flown.why
+    if len(stops) == 1 and not beyond:
+        beyond = "all its glides that are left end at the depth where the vehicle is, so it flies none of them"
     if low < len(stops) - 1:
         more = known[low + 1]
         beyond = f"a new plan from the next surfacing would cost {more:.1%} more in all than the new plan now"

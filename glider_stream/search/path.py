@@ -316,6 +316,10 @@ def hops_of(path: Path) -> list[Hop]:
     ]
 
 
+BESIDE = 0.01
+"""Parts of a leg in a file may differ by this share of its length or time, or of 1 m or 1 s if it is shorter."""
+
+
 def load_path(file: str | File) -> Path:
     """Read a path file (JSON) that `query` wrote; InputError if it is another file or holds no leg."""
     try:
@@ -327,6 +331,7 @@ def load_path(file: str | File) -> Path:
         require(len(table["legs"]) > 0, "it holds no leg, so there is nothing to draw")
         require(table.get("found") is True, f"its `found` is {table.get('found')!r}, yet it has legs")
         legs = tuple(_read_leg(leg, f"leg {n}") for n, leg in enumerate(table["legs"], 1))
+        _check_legs(legs)
         cost = float(_numbers(table, "cost", "the path"))
         clock = np.concatenate([[0.0], *(leg.trajectory[:, 0] for leg in legs)])
         require(bool((np.diff(clock) >= 0).all()), "the times of its trajectory do not rise from 0")
@@ -364,6 +369,29 @@ def _read_leg(leg: Any, where: str) -> Leg:
     start, end = (_numbers(leg, name, where, 3) for name in ("from", "to"))
     rows = _numbers(leg, "trajectory", where, None, 4)
     return Leg(start, end, angle, heading, speed, depart, duration, miss, rows)
+
+
+def _check_legs(legs: tuple[Leg, ...]) -> None:
+    """Raise InputError unless each leg is one glide, whose parts agree, and begins where and when the last one
+    ends.
+
+    A file that was changed by hand, a stop without its trajectory or a leg taken out, is no plan that was found.
+    """
+    here, clock = legs[0].start, legs[0].depart
+    for n, leg in enumerate(legs, 1):
+        rows, rises = leg.trajectory, leg.speed * math.sin(leg.glide_angle) * leg.duration
+        most = BESIDE * max(1.0, math.dist(leg.start, leg.end))
+        late = [leg.depart - clock, rows[0, 0] - leg.depart, rows[-1, 0] - leg.depart - leg.duration]
+        odd = {
+            "begins beside the end of the leg before": math.dist(here, leg.start) > most,
+            "has a trajectory that begins elsewhere": math.dist(rows[0, 1:], leg.start) > most,
+            "has a trajectory that ends elsewhere": math.dist(rows[-1, 1:], leg.end) > leg.miss + most,
+            "does not reach its depth in its time": abs(leg.end[2] - leg.start[2] - rises) > leg.miss + most,
+            "has times that do not fit": max(map(abs, late)) > BESIDE * max(1.0, leg.duration),
+        }
+        wrong = next((what for what, found in odd.items() if found), None)
+        require(wrong is None, f"leg {n} {wrong}, so the file was changed")
+        here, clock = leg.end, leg.depart + leg.duration
 
 
 def _numbers(table: dict[str, Any], key: str, where: str, *shape: int | None) -> Array:

@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.checks import FASTEST
 from ..base.settings import require
+
+FASTEST = 5.0
+"""A current, or a speed through water, above this [m/s] is an error of the fixes, the times or the units."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ def averaged_current(
     speed = float(np.hypot(*current))
     require(
         speed <= FASTEST,
-        f"the fixes and the way through water give a current of {speed:.3g} m/s; check them and the times",
+        f"the fixes and the way through water give a current of {speed:.3g} m/s, above {FASTEST:g}; check "
+        "them, the times and the units",
     )
     along, across = np.asarray(through_water, np.float64), np.array([-through_water[1], through_water[0]])
     variance = 2 * errors.fix**2 + (errors.speed * along) ** 2 + (errors.heading * across) ** 2

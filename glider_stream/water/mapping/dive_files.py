@@ -93,7 +93,8 @@ def read_dives(files: str | Path | Sequence[str | Path], columns: Mapping[str, s
     names = ("lon", "lat", "lon_end", "lat_end", "start", "end", "bottom", "east", "north", "error")
     joined: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     # the profiles of one dive repeat its current
-    rows = np.stack([joined["lon"], joined["lat"], joined["start"].astype(np.float64), joined["east"]], axis=-1)
+    same = joined["lon"], joined["lat"], joined["start"].astype(np.float64), joined["east"], joined["north"]
+    rows = np.stack(same, axis=-1)
     _, once = np.unique(rows, axis=0, return_index=True)
     once = np.sort(once)
     return Dives(**{name: values[once] for name, values in joined.items()}, yos=1, notes=notes)
@@ -169,8 +170,8 @@ class _Columns:
         """Return the texts of a column; InputError without it."""
         require(
             what in self.found,
-            f"{self.name} has no column for `{what}`, such as {self.usual[what][0]}; name it, or add it; it has: "
-            f"{', '.join(self.header)}",
+            f"{self.name} has no column for `{what}`, such as {', '.join(self.usual[what][:2])}; name it "
+            f"by --column {what}=COLUMN, or add it; it has: {', '.join(self.header)}",
         )
         at = self.header.index(self.found[what])
         return [row[at] for _, row in self.rows]

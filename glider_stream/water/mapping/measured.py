@@ -14,6 +14,8 @@ from ..frame import LocalFrame
 from ..ocean.file import Times
 from .observations import Observations, at_points, dive_averages, drifts
 
+METRES_PER_DEGREE = 111e3
+"""Of latitude, roughly: enough to find a wrong fix."""
 FASTEST = 5.0
 """A measured current above this [m/s] is an error of the file."""
 
@@ -147,6 +149,23 @@ class Dives(_Table):
     def __post_init__(self) -> None:
         _check("a dive", self.lon, self.lat, self.east, self.north)
         _check("a dive", self.lon_end, self.lat_end, self.east, self.north)
+        self._check_ways()
+
+    def _check_ways(self) -> None:
+        """Raise InputError if a dive ends before it starts, or too far away for its time."""
+        lasting = (self.end - self.start) / np.timedelta64(1, "s")
+        back = np.flatnonzero(lasting < 0)
+        when = f"the dive of {self.start[back[0]]} ends before, at {self.end[back[0]]}" if back.size else ""
+        require(not back.size, f"{when}; mend its times")
+        # dives of files that give one time, that of their middle or end, have a place for each end
+        known = np.flatnonzero(lasting > 0)
+        middle = np.radians((self.lat + self.lat_end) / 2)
+        east = ((self.lon_end - self.lon + 180) % 360 - 180) * np.cos(middle)
+        speed = METRES_PER_DEGREE * np.hypot(east, self.lat_end - self.lat)[known] / lasting[known]
+        if speed.size and speed.max() > FASTEST:
+            n = known[speed.argmax()]
+            ends = f"the dive of {self.start[n]} ends {speed.max() * lasting[n] / 1000:,.0f} km from its start"
+            require(False, f"{ends}, at {speed.max():.1f} m/s, faster than any glider; mend its fixes or times")
 
     @property
     def count(self) -> int:

@@ -194,7 +194,9 @@ def dive_averages(
     require(yos >= 1, f"a dive has at least one yo; got {yos}")
     u, v, error, top, bottom = _columns(count, u=u, v=v, error=error, top=top, bottom=bottom)
     begin, finish = _columns(count, start_times=times[0], end_times=times[1])
-    require(bool((bottom > top).all()), "a dive must go below its top; leave out those that do not")
+    flat = np.flatnonzero(~(bottom > top))
+    least = f"{bottom[flat[0]]:g} m deep" if flat.size else ""
+    require(not flat.size, f"a dive must go below its top; got a dive {least}: depths are positive, in metres")
     require(bool((finish >= begin).all()), "a dive must end after it starts; mend its times")
     share, depth, weight = _path(top, bottom, yos)
     x, y = (start[:, n, None] + share * (end - start)[:, n, None] for n in range(2))

@@ -1,0 +1,129 @@
+"""Plans changed by hand, fixes that cannot be, dives that no vehicle makes, outputs over their inputs."""
+
+import json
+import math
+
+import pytest
+from helpers.small import command, roadmap
+
+import glider_stream
+from glider_stream import planner
+from glider_stream.base.errors import InputError
+from glider_stream.pilot.currents import dive_currents
+from glider_stream.roadmap.store import write_roadmap
+from glider_stream.search.path import load_path
+from glider_stream.water.mapping.dive_files import read_dives
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    """A plan of the small roadmap, as a table, and its file."""
+    folder = tmp_path_factory.mktemp("mended")
+    write_roadmap(roadmap(), folder / "small.h5")
+    glider_stream.open(folder / "small.h5").query(outputs=[folder / "plan.json"])
+    return folder / "plan.json"
+
+
+def moved(leg, name, by):
+    leg[name][0] += by
+
+
+CHANGES = {
+    "trajectory that ends elsewhere": lambda legs: moved(legs[-1], "to", -300.0),
+    "begins beside the end of the leg before": lambda legs: legs.pop(1),
+    "trajectory that begins elsewhere": lambda legs: moved(legs[0], "from", 50.0),
+    "reach its depth": lambda legs: legs[1].update(glide_angle_rad=-legs[1]["glide_angle_rad"]),
+    "times that do not fit": lambda legs: legs[2].update(depart_s=legs[2]["depart_s"] + 500.0),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_plan_changed_by_hand_is_refused(plan, tmp_path, what):
+    table = json.loads(plan.read_text())
+    CHANGES[what](table["legs"])
+    (tmp_path / "plan.json").write_text(json.dumps(table))
+    with pytest.raises(InputError, match=f"{what}.*so the file was changed"):
+        load_path(tmp_path / "plan.json")
+
+
+def test_a_fix_in_seconds_since_1970_and_a_current_in_cm_per_second(plan, capsys):
+    said = command(capsys, "replan", plan, "--fix=-60,60,1732111200")
+    assert (said.code, "20,048 days after the plan's departure" in said.err) == (2, True)
+    said = command(capsys, "replan", plan, "--fix=-60,60,300", "--dac", "8,-6")
+    assert (said.code, "at most 5" in said.err) == (2, True)
+    for wrong in ((math.nan, 0.0), (0.1,)):
+        with pytest.raises(InputError, match="`dac` must be two numbers"):
+            planner.replan(plan, (-60.0, 60.0), 300.0, dac=wrong)
+
+
+def test_a_list_with_nothing_to_fly_is_not_good_to_its_end(plan):
+    answer = planner.replan(plan, (-60.0, 60.0), 200.0)
+    assert not answer.flown.path.legs
+    assert not answer.good.whole
+    assert "so it flies none of them; bring the new one now" in str(answer)
+
+
+FIXES = "t_start,lon_start,lat_start,t_end,lon_end,lat_end"
+DIVE = "2024-11-20T12:00,18.30,38.08,2024-11-20T13:30,18.316,{lat}"
+WAY = {"heading": "130", "horizontal": "0.3"}
+LINES = {
+    "above 5": {"lat": "39.066"},
+    "horizontal = -0.3 must be from 0 to 5 m/s": {"horizontal": "-0.3"},
+    "horizontal = 30 must be": {"horizontal": "30"},
+    "heading = 999 must be from -360 to 360 degrees": {"heading": "999"},
+    "max_depth = -600 must be from 0": {"max_depth": "-600"},
+    "without a column `surface`": {"drift_east": "0.1", "drift_north": "0.1"},
+    "without a column `drift_north`": {"drift_east": "0.1", "surface": "600"},
+}
+
+
+@pytest.mark.parametrize("why", LINES)
+def test_dives_that_no_vehicle_makes(tmp_path, why):
+    change = dict(LINES[why])
+    dive = DIVE.format(lat=change.pop("lat", "38.066"))
+    more = WAY | change
+    file = tmp_path / "dives.csv"
+    file.write_text(f"{FIXES},{','.join(more)}\n{dive},{','.join(more.values())}\n")
+    with pytest.raises(InputError, match=why):
+        dive_currents(file)
+
+
+def test_a_declination_without_headings_and_an_output_over_its_input(tmp_path):
+    file = tmp_path / "dives.csv"
+    text = f"{FIXES},east,north\n{DIVE.format(lat=38.066)},1000,-1100\n"
+    file.write_text(text)
+    with pytest.raises(InputError, match="added to headings"):
+        dive_currents(file, declination=4.0)
+    with pytest.raises(InputError, match="which would be lost"):
+        planner.currents(file, file)
+    assert file.read_text() == text
+
+
+DIVES = "start,end,lon_start,lat_start,lon_end,lat_end,max_depth,dac_east,dac_north"
+
+
+def test_maps_do_not_replace_what_they_read(tmp_path):
+    dives, link, forecast = tmp_path / "dives.csv", tmp_path / "link.nc", tmp_path / "a-members.nc"
+    dives.write_text(f"{DIVES}\n2024-11-20T12:00,2024-11-20T15:00,18.3,38.1,18.34,38.07,900,0.1,0\n")
+    forecast.write_text("not read")
+    link.symlink_to(forecast)
+    for output, members in ((dives, 0), (link, 0), (forecast, 0), (tmp_path / "a.nc", 2)):
+        with pytest.raises(InputError, match="which would be lost"):
+            planner.assimilate(forecast, output, dives=[dives], members=members)
+    with pytest.raises(InputError, match="which would be lost"):
+        planner.map_currents((18.0, 18.6), (37.9, 38.2), 5000, dives, dives=[dives])
+
+
+def test_dives_too_fast_backward_or_of_one_place_and_two_currents(tmp_path):
+    file = tmp_path / "dives.csv"
+    line = "2024-11-20T{a},2024-11-20T{b},18.3,38.1,{lon},38.07,900,0.1,{north}"
+    for values, why in (
+        ({"a": "12:00", "b": "15:30", "lon": 19.34}, "7.2 m/s, faster than any glider"),
+        ({"a": "15:30", "b": "12:00", "lon": 18.34}, "ends before"),
+    ):
+        file.write_text(f"{DIVES}\n{line.format(north=0, **values)}\n")
+        with pytest.raises(InputError, match=why):
+            read_dives(file)
+    lines = [line.format(a="12:00", b="15:30", lon=18.34, north=north) for north in (0.1, -0.1, -0.1)]
+    file.write_text("\n".join([DIVES, *lines]))
+    assert read_dives(file).north.tolist() == [0.1, -0.1]
