@@ -649,9 +649,13 @@ def _check_map(output: str | File | None, members: int, inputs: Sequence[str | F
     require(members >= 0, f"`members` must be 0 or more; got {members}")
     require(members == 0 or output is not None, "`members` need an output file; name one")
     if output is not None:
+        check_apart(output, inputs)
+        require(
+            File(output).suffix.lower() in (".nc", ".nc4"), f"the output {output} must end in .nc: it is NetCDF"
+        )
         for file in [output, *([members_file(output)] if members else [])]:
-            check_output(file)
             check_apart(file, inputs)
+            check_output(file)
 
 
 def _measurements(

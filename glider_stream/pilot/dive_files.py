@@ -115,15 +115,11 @@ def read_dive_records(
         f"name a column by --column WHAT=COLUMN{listed}",
     )
     assert way is not None
-    require(
-        "heading" in way or declination == 0,
-        f"the declination is added to headings; {path.name} gives {' and '.join(way)}: leave it out",
-    )
+    # the files of some gliders hold the drift without its time: it is not used, unless it is asked for by name
     for what, needs in (("drift_east", "drift_north"), ("drift_north", "drift_east"), ("drift_east", "surface")):
         require(
-            what not in found or needs in found,
-            f"{path.name} has `{found.get(what)}` without a column `{needs}`, so it cannot be used; add it by "
-            f"--column {needs}=COLUMN, or take `{found.get(what)}` out",
+            what not in (columns or {}) or needs in found,
+            f"`{what}` needs a column `{needs}`; add it by --column {needs}=COLUMN, or leave `{what}` out",
         )
     at = {what: header.index(column) for what, column in found.items()}
     return [

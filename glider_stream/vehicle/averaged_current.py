@@ -75,8 +75,8 @@ def averaged_current(
     speed = float(np.hypot(*current))
     require(
         speed <= FASTEST,
-        f"the fixes and the way through water give a current of {speed:.3g} m/s, above {FASTEST:g}; check "
-        "them, the times and the units",
+        f"the fixes and the way through water give a current of {speed:.3g} m/s, above {FASTEST:g}; "
+        "check them and the times, and the units",
     )
     along, across = np.asarray(through_water, np.float64), np.array([-through_water[1], through_water[0]])
     variance = 2 * errors.fix**2 + (errors.speed * along) ** 2 + (errors.heading * across) ** 2

@@ -72,8 +72,6 @@ LINES = {
     "horizontal = 30 must be": {"horizontal": "30"},
     "heading = 999 must be from -360 to 360 degrees": {"heading": "999"},
     "max_depth = -600 must be from 0": {"max_depth": "-600"},
-    "without a column `surface`": {"drift_east": "0.1", "drift_north": "0.1"},
-    "without a column `drift_north`": {"drift_east": "0.1", "surface": "600"},
 }
 
 
@@ -88,12 +86,12 @@ def test_dives_that_no_vehicle_makes(tmp_path, why):
         dive_currents(file)
 
 
-def test_a_declination_without_headings_and_an_output_over_its_input(tmp_path):
+def test_half_a_drift_and_an_output_over_its_input(tmp_path):
     file = tmp_path / "dives.csv"
-    text = f"{FIXES},east,north\n{DIVE.format(lat=38.066)},1000,-1100\n"
+    text = f"{FIXES},east,north,drift\n{DIVE.format(lat=38.066)},1000,-1100,0.1\n"
     file.write_text(text)
-    with pytest.raises(InputError, match="added to headings"):
-        dive_currents(file, declination=4.0)
+    with pytest.raises(InputError, match="`drift_east` needs a column `drift_north`"):
+        dive_currents(file, {"drift_east": "drift"})
     with pytest.raises(InputError, match="which would be lost"):
         planner.currents(file, file)
     assert file.read_text() == text
@@ -112,6 +110,11 @@ def test_maps_do_not_replace_what_they_read(tmp_path):
             planner.assimilate(forecast, output, dives=[dives], members=members)
     with pytest.raises(InputError, match="which would be lost"):
         planner.map_currents((18.0, 18.6), (37.9, 38.2), 5000, dives, dives=[dives])
+
+
+def test_a_map_is_netcdf(tmp_path):
+    with pytest.raises(InputError, match=r"better.csv must end in .nc"):
+        planner.assimilate("a.nc", tmp_path / "better.csv", dives=["a.csv"])
 
 
 def test_dives_too_fast_backward_or_of_one_place_and_two_currents(tmp_path):

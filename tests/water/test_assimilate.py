@@ -193,7 +193,7 @@ def test_a_map_without_a_forecast(tmp_path, monkeypatch, capsys):
         ),
         (
             ["--points", "dives.csv"],
-            "dives.csv has no column for `lon`, such as lon; name it, or add it; it has: ",
+            "dives.csv has no column for `lon`, such as lon or longitude; name it, or add it; it has: ",
         ),
         (["--dives", "forecast.nc"], "forecast.nc holds no current averaged over a dive"),
         (["--dives", "nowhere.csv"], "the file of dives nowhere.csv does not exist"),
@@ -277,7 +277,7 @@ def test_a_csv_file_of_dives(tmp_path):
     assert not found.notes
     odd = DIVES.replace("dac_east_mps", "here").replace("lon_end", "x")
     (tmp_path / "odd.csv").write_text(odd)
-    with pytest.raises(InputError, match=r"odd\.csv has no column for `east`, such as dac_east; name it"):
+    with pytest.raises(InputError, match=r"odd\.csv has no column for `east`, such as dac_east or"):
         read_dives(tmp_path / "odd.csv")
     named = read_dives(tmp_path / "odd.csv", {"east": "here"})
     assert (named.lon_end == named.lon).all()
