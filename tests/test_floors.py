@@ -15,7 +15,7 @@ FLOORS = {
     3: "water vehicle",
     4: "roadmap",
     5: "scenario search jobs",
-    6: "plot pilot evaluation",
+    6: "plot pilot evaluation mission",
     7: "opened planner cli __main__",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
