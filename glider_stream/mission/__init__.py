@@ -1,1 +1,1 @@
-"""Missions: a vehicle flies in a true current that differs from the forecast, and a pilot plans again and again."""
+"""Missions: a vehicle flies in a true current that differs from the forecast; a pilot plans again and again."""

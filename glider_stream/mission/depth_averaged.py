@@ -38,7 +38,7 @@ class Chart:
     away: Array
 
     def fastest(self, start: Array, goal: Array, t: float, speed: float) -> Array | None:
-        """Return the fastest way (n, 2) [m] from a start to a goal (2,) [m] that leaves at t [s]; None without one.
+        """Return the fastest way (n, 2) [m] from a start to a goal (2,) [m] that leaves at t [s], or None.
 
         A* with the clock running: the current of a way is the mean of its ends', at the time at which it begins.
         The rest takes at least its length at the speed through water and the greatest current.

@@ -36,8 +36,8 @@ class ErrorField(NamedTuple):
     def on_mesh(self, x: Array, y: Array, z: Array, t: Array) -> Array:
         """Return the current (times, levels, points, 2) [m/s] at places x, y (points,), at each of all z and t.
 
-        The sine of a sum is a sum of two products, so each wave is computed once for each place, and once for each
-        depth and time.
+        The sine of a sum is a sum of two products, so each wave is computed once for each place, and once for
+        each depth and time.
         """
         then = t[:, None, None] * self.w + z[None, :, None] * self.kz + self.phase
         here = np.outer(self.kx, x) + np.outer(self.ky, y)
@@ -57,5 +57,5 @@ def error_field(settings: ForecastError, random: np.random.Generator) -> ErrorFi
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Return the matrix product; unlike `@`, whose library may split sums by threads, always with the same bits."""
+    """Return the matrix product; unlike `@`, whose library may split sums by threads, always the same bits."""
     return np.asarray(np.einsum("am,mb->ab", a, b))

@@ -31,7 +31,7 @@ DEPTH, REACHED, BLOCKED, OUTSIDE = (int(end) for end in End)
 
 
 class Motion(NamedTuple):
-    """What the vehicle does in truth: `horizontal` speed through water and `w` [m/s], `turn` [rad] off its heading."""
+    """The true motion: `horizontal` speed and `w` through water [m/s], `turn` [rad] off the heading."""
 
     horizontal: float
     w: float
@@ -49,7 +49,7 @@ class Belief(NamedTuple):
 
 
 class Aim(NamedTuple):
-    """The fixed `heading` [rad], or the waypoints `stops` (n, 2) [m] from number `first` on, reached at `radius` [m].
+    """A fixed `heading` [rad], or waypoints `stops` (n, 2) [m] from number `first` on, reached at `radius` [m].
 
     With `stops` empty the heading holds. `ends`: whether the glide ends when the last waypoint is reached.
     """
@@ -65,6 +65,7 @@ class Glided(NamedTuple):
     """A glide as it was flown: rows [t, x, y, z], how it `ended`, and what the vehicle believes afterwards.
 
     `x`, `y` [m]: its place by dead reckoning; `own_x`, `own_y` [m]: its way through water; `stop`: its waypoint.
+    `true_x`, `true_y` [m]: its way through water in truth.
     """
 
     rows: Array
@@ -74,6 +75,8 @@ class Glided(NamedTuple):
     own_x: float
     own_y: float
     stop: int
+    true_x: float
+    true_y: float
 
 
 @entry_point()
@@ -102,7 +105,7 @@ def fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows):  
     """
     here, count, ended, stop = start, 1, DEPTH, aim.first
     rows[0] = start.t, start.x, start.y, start.z
-    x, y, own_x, own_y = belief.x, belief.y, 0.0, 0.0
+    x, y, own_x, own_y, true_x, true_y = belief.x, belief.y, 0.0, 0.0, 0.0, 0.0
     left = duration if motion.w == 0.0 else max((depth - start.z) / motion.w, 0.0)
     heading, steers = aim.heading, aim.stops.shape[0] > 0
     while left > 0.0:
@@ -129,11 +132,12 @@ def fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows):  
             break
         here = Place(east, north, height, here.t + step)
         forward_x, forward_y = belief.horizontal * math.cos(heading), belief.horizontal * math.sin(heading)
+        true_x, true_y = true_x + through.u * step, true_y + through.v * step
         own_x, own_y = own_x + forward_x * step, own_y + forward_y * step
         x, y = x + (forward_x + belief.u) * step, y + (forward_y + belief.v) * step
         rows[count] = here.t, here.x, here.y, here.z
         count += 1
-    return count, ended, x, y, own_x, own_y, stop
+    return count, ended, x, y, own_x, own_y, stop, true_x, true_y
 
 
 def glided(

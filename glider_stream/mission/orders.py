@@ -54,8 +54,8 @@ def trims_of(path: Path) -> Trims:
 def waypoints_of(path: Path) -> Waypoints:
     """Return the places where a plan comes up, with the yo that stands for the legs before each.
 
-    A yo goes down to the deepest of those legs; its angle is that of a vehicle that goes as far through water, and
-    as far up and down, as they do.
+    A yo goes down to the deepest of those legs; its angle is that of a vehicle that goes as far through water,
+    and as far up and down, as they do.
     """
     stops, depths, angles = [], [], []
     deepest = down = across = 0.0

@@ -22,7 +22,7 @@ from .vehicle import Fix
 
 
 class Office:
-    """What a pilot plans with in one current: a problem, its planner and its chart, each made when it is needed."""
+    """What a pilot plans with in one current: a problem, its planner and chart, each made when it is needed."""
 
     def __init__(self, problem: Problem, mission: Mission) -> None:
         """Keep the problem."""
@@ -57,7 +57,7 @@ class Office:
         return float(self.problem.evaluator.polar.best_angle[DIVE])
 
     def route(self, fix: Fix) -> Path | None:
-        """Return the best route from a fix to the goal; None if there is none or the fix lies outside the water."""
+        """Return the best route from a fix to the goal; None without one, or if the fix is outside the water."""
         start = np.array([fix.x, fix.y, 0.0])
         if not bool(self.problem.evaluator.allowed(start[None], fix.t)[0]):
             return None
@@ -82,7 +82,7 @@ class Plan:
 
 
 class Policy(ABC):
-    """A way to make orders; `replans`: whether it makes new ones at each call. `knows` the true current or not."""
+    """A way to make orders; `replans`: again at each call; `knows`: it plans in the true current."""
 
     replans = True
     knows = False

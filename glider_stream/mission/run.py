@@ -11,7 +11,7 @@ from .orders import Orders, Trims
 from .pilot import POLICIES, Office, Plan, Policy
 from .settings import Mission
 from .vehicle import Phase, Vehicle
-from .world import World, Worlds, seeds_of
+from .world import Worlds, seeds_of
 
 ENDS = ("arrived", "out of time", "missed the goal", "aground", "left the domain", "no plan")
 """How runs end. "missed the goal": the list was flown to its end elsewhere, and the policy makes no other."""
@@ -49,7 +49,7 @@ class Outcome:
 
 @dataclass
 class Flight:
-    """A run in all its parts: its `outcome`, its `phases`, and the plans, each with the time when it was made [s]."""
+    """A run in all its parts: its `outcome`, its `phases`, and its plans, each with its time [s]."""
 
     outcome: Outcome
     phases: list[Phase]
@@ -70,13 +70,13 @@ class Runner:
         return [flight.outcome for flight in self.flights(number)]
 
     def flights(self, number: int) -> list[Flight]:
-        """Return a run of each policy: all in the same world, with the same errors of the vehicle to draw from."""
-        world = self.worlds.world(number)
-        office = self._office(world)
+        """Return a run of each policy, all in the same world and with the same seed of the vehicle's errors."""
+        office = self.office(number)
         return [self.flight(name, number, office) for name in self.mission.pilot.policies]
 
-    def _office(self, world: World) -> Office:
-        """Return the forecast's office; a forecast that is the same in all runs has one."""
+    def office(self, number: int) -> Office:
+        """Return the office with a run's forecast; a forecast that is the same in all runs has one office."""
+        world = self.worlds.world(number)
         if world.forecast is self.worlds.true:
             return self._true
         if self.mission.truth is None:
@@ -96,7 +96,7 @@ class Runner:
             mission.pilot.rule,
             mission.energy,
             np.random.default_rng(seeds_of(mission, number)[1]),
-            Place(*map(float, true.start), true.departure),
+            Place(float(true.start[0]), float(true.start[1]), float(true.start[2]), true.departure),
         )
         return _Run(vehicle, policy, office, mission).fly(name, number)
 
@@ -108,10 +108,12 @@ class _Run:
         self.failed = self.without = 0
 
     def fly(self, name: str, number: int) -> Flight:
-        vehicle, office = self.vehicle, self.office
+        vehicle = self.vehicle
         departure = vehicle.here.t
         ended = self._ended(departure)
-        track = [np.array([[departure, *office.problem.start]]), *(phase.rows for phase in vehicle.phases)]
+        begin = self.office.problem.start
+        assert begin is not None
+        track = [np.array([[departure, *begin]]), *(phase.rows for phase in vehicle.phases)]
         outcome = Outcome(
             name,
             number,
@@ -148,7 +150,7 @@ class _Run:
             if self._off() <= self.mission.arrival.radius_m:
                 return "arrived"
             called = vehicle.call()
-            if vehicle.lost:
+            if called is None:
                 return vehicle.lost
             self.failed += not called
             new = self._plan() if called and self.policy.replans else None

@@ -24,6 +24,8 @@ from ..scenario import (
 from ..search.surfacing import Surfacing
 from ..vehicle.cost import Energy, energy_from_table
 
+POLICIES = ("open-loop", "replan", "straight", "depth-averaged", "omniscient")
+"""The names of the policies; `pilot` has a class for each."""
 MOST_DEGREES = 180.0
 MOST_SHARE = 10.0
 """A forecast whose error is larger than this many times the true current is surely a slip."""
@@ -59,7 +61,7 @@ class VehicleSettings:
     """How the vehicle executes its orders; errors are standard deviations, drawn from normal distributions.
 
     `steering`: "trims" (the plan's headings and glide angles, leg by leg) or "waypoints" (it heads for the places
-    where the plan surfaces). `heading_bias_deg` and `speed_bias` are drawn once for each run, `heading_error_deg`,
+    where the plan surfaces). `heading_bias_deg` and `speed_bias` are drawn once a run, `heading_error_deg`,
     `speed_error` and `depth_error_m` for each leg; speeds are shares. `call_minutes`: the time at the surface of
     each call, during which it drifts. `fix_error_m`: of a position fix, in each direction. `call_failure`: the
     probability that a call brings no new orders. `waypoint_radius_m`: a waypoint counts as reached this near.
@@ -95,13 +97,20 @@ class VehicleSettings:
 
 @dataclass(frozen=True)
 class PilotSettings:
-    """The policies to compare, and how often the vehicle comes up: at most after so many yos and so many hours."""
+    """The policies, and how often the vehicle comes up: at the latest after so many yos and so many hours."""
 
     policies: tuple[str, ...]
     most_yos: int | None = None
     most_hours: float | None = None
 
     def __post_init__(self) -> None:
+        choices = ", ".join(POLICIES)
+        for name in self.policies:
+            require(
+                name in POLICIES, f"`pilot.policies` names {name!r}, which is not known; choose from: {choices}"
+            )
+        several = len(self.policies) > 0 and len(set(self.policies)) == len(self.policies)
+        require(several, f"`pilot.policies` must name each policy once; got {list(self.policies)}")
         cure = "give `pilot.most_yos`, `pilot.most_hours` or both"
         given = self.most_yos is not None or self.most_hours is not None
         require(given, f"the vehicle must come up to be given new orders; {cure}")
@@ -115,7 +124,7 @@ class PilotSettings:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A run arrives if the vehicle comes up within `radius_m` of the goal, at most `longest_hours` after it left."""
+    """A run arrives if the vehicle comes up within `radius_m` of the goal, at most `longest_hours` later."""
 
     radius_m: float
     longest_hours: float
@@ -142,7 +151,7 @@ class Random:
 
 @dataclass(frozen=True)
 class ScenarioChoice:
-    """The scenario of a mission: a file or a shipped `name`, and texts section.key=value that override its keys."""
+    """The scenario: a file or a shipped `name`, and texts section.key=value that override its keys."""
 
     name: str
     set: tuple[str, ...] = ()
@@ -197,13 +206,17 @@ def read_mission(name: str | Path, overrides: Sequence[str] = ()) -> Mission:
         path = shipped_missions()[str(name)]
     known = ", ".join(shipped_missions())
     exists = path.is_file()
-    require(exists, f"the mission {name} is neither a file nor a shipped mission; choose a file, or one of: {known}")
+    require(
+        exists, f"the mission {name} is neither a file nor a shipped mission; choose a file, or one of: {known}"
+    )
     table = read_table(path, f"the mission {name}")
     mine = [text for text in overrides if _section(text) in SECTIONS_OF_MISSION]
     others = [text for text in overrides if text not in mine]
     unknown = [text for text in others if _section(text) not in SECTIONS]
     sections = ", ".join([*SECTIONS_OF_MISSION, *SECTIONS])
-    require(not unknown, f"`--set {unknown[:1]}` names no section of a mission or a scenario; choose from: {sections}")
+    require(
+        not unknown, f"`--set {unknown[:1]}` names no section of a mission or a scenario; choose from: {sections}"
+    )
     for text in mine:
         set_key(table, text)
     return mission_from_table(table, path, others)
@@ -217,7 +230,9 @@ def mission_from_table(table: Mapping[str, Any], path: Path, overrides: Sequence
     """Return the mission of a table, with every key checked; `overrides` are for keys of its scenario."""
     for name, block in table.items():
         choices = ", ".join(SECTIONS_OF_MISSION)
-        require(name in SECTIONS_OF_MISSION, f"the section `{name}` of a mission is not known; choose from: {choices}")
+        require(
+            name in SECTIONS_OF_MISSION, f"the section `{name}` of a mission is not known; choose from: {choices}"
+        )
         require(isinstance(block, Mapping), f"`{name}` must be a section, [{name}]; got {block!r}")
     for name, what in SECTIONS_OF_MISSION.items():
         needed = name not in ("truth", "forecast_error")
@@ -230,6 +245,11 @@ def mission_from_table(table: Mapping[str, Any], path: Path, overrides: Sequence
     truth = None
     if "truth" in table:
         truth = scenario_from_table({**tomllib.loads(scenario.text), "flow": table["truth"]}, path.parent)
+    vehicle = from_table(VehicleSettings, table["vehicle"], "vehicle")
+    arrival = from_table(Arrival, table["arrival"], "arrival")
+    wide = vehicle.waypoint_radius_m <= arrival.radius_m
+    cure = f"`arrival.radius_m`, {arrival.radius_m:g} m: who has reached the last waypoint would not have arrived"
+    require(wide, f"`vehicle.waypoint_radius_m` = {vehicle.waypoint_radius_m:g} m must not be above {cure}")
     error = None
     if "forecast_error" in table:
         error = from_table(ForecastError, table["forecast_error"], "forecast_error")
@@ -240,9 +260,9 @@ def mission_from_table(table: Mapping[str, Any], path: Path, overrides: Sequence
         scenario=scenario,
         truth=truth,
         forecast_error=error,
-        vehicle=from_table(VehicleSettings, table["vehicle"], "vehicle"),
+        vehicle=vehicle,
         pilot=from_table(PilotSettings, table["pilot"], "pilot"),
-        arrival=from_table(Arrival, table["arrival"], "arrival"),
+        arrival=arrival,
         energy=from_table(Energy, energy_from_table(dict(table["energy"])), "energy"),
         random=from_table(Random, table["random"], "random"),
         text=to_toml({**kept, "scenario": tomllib.loads(scenario.text)}),
@@ -251,7 +271,7 @@ def mission_from_table(table: Mapping[str, Any], path: Path, overrides: Sequence
 
 
 def _scenario(choice: ScenarioChoice, folder: Path, overrides: Sequence[str]) -> Scenario:
-    """Return the scenario of a mission; its file, and files in `set`, are named relative to the mission's folder."""
+    """Return the scenario; its file, and files in `set`, are named relative to the mission's folder."""
     beside = folder / choice.name
     shipped = choice.name in shipped_scenarios() and not beside.is_file()
     name = choice.name if shipped else str(beside)

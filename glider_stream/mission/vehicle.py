@@ -23,9 +23,9 @@ SHALLOWEST = 10.0
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of a run: a dive, a climb or a drift, rows [t, x, y, z], with its signed glide angle and heading [rad].
+    """A part of a run, a dive, a climb or a drift: rows [t, x, y, z], and the mean glide that it was in truth.
 
-    `speed` through water [m/s] is what the vehicle takes it to be; 0 in a drift, like the glide angle.
+    `glide_angle` (signed) and `heading` [rad], `speed` through water [m/s]; all 0 in a drift.
     """
 
     rows: Array
@@ -137,7 +137,7 @@ class Vehicle:
         z = 0.0 if is_up(trim.z) else min(trim.z + off, 0.0)
         climbs = trim.glide_angle > 0
         if (z - self.here.z) * trim.glide_angle <= 0.0:  # the last turn's error has brought it there already
-            return Glided(np.empty((0, 4)), int(End.DEPTH), *self._believed, 0.0, 0.0, aim.first)
+            return Glided(np.empty((0, 4)), int(End.DEPTH), *self._believed, 0.0, 0.0, aim.first, 0.0, 0.0)
         along = math.cos(trim.glide_angle)
         flown = glided(
             evaluator.flow,
@@ -152,15 +152,14 @@ class Vehicle:
         )
         self._own = self._own[0] + flown.own_x, self._own[1] + flown.own_y
         self._believed = flown.x, flown.y
-        heading = math.atan2(flown.own_y, flown.own_x) if aim.stops.size else trim.heading
-        return self._flown(flown, Phase(flown.rows, trim.glide_angle, heading, trim.speed), climbs)
+        return self._flown(flown, climbs)
 
-    def _flown(self, flown: Glided, phase: Phase, climbs: bool) -> Glided | None:
+    def _flown(self, flown: Glided, climbs: bool) -> Glided | None:
         """Note a glide, what it cost and whether it ended the run."""
         rows = flown.rows
-        self.here = Place(*map(float, rows[-1, 1:]), float(rows[-1, 0]))
+        self.here = _place(rows[-1])
         if len(rows) > 1:
-            self.phases.append(phase)
+            self.phases.append(_phase(flown))
             self.spent += self.energy.hotel * (rows[-1, 0] - rows[0, 0]) + self.energy.trim
             pump = self.energy.inflection(rows[0, 3])
             self.spent += float(pump) if climbs and pump is not None else 0.0
@@ -191,20 +190,26 @@ class Vehicle:
 
     # at the surface
 
-    def call(self) -> bool:
-        """Drift during a call, and take a fix at its end; return whether the call brings new orders."""
+    def call(self) -> bool | None:
+        """Drift during a call, and take a fix at its end; return whether the call brings new orders.
+
+        Return None if the vehicle is lost.
+        """
         seconds = 60.0 * self.settings.call_minutes
         if seconds > 0.0:
             evaluator = self.problem.evaluator
             still = Motion(0.0, 0.0, 0.0), Belief(0.0, 0.0, 0.0, 0.0, 0.0), Aim(0.0, NOWHERE, 0, 0.0, False)
-            drifted = glided(evaluator.flow, self._ground, self.here, 0.0, seconds, *still, evaluator.integration.dt)
+            step = evaluator.integration.dt
+            drifted = glided(evaluator.flow, self._ground, self.here, 0.0, seconds, *still, step)
             rows = drifted.rows
-            self.here = Place(*map(float, rows[-1, 1:]), float(rows[-1, 0]))
+            self.here = _place(rows[-1])
             self.spent += self.energy.hotel * float(rows[-1, 0] - rows[0, 0])
             if len(rows) > 1:
                 self.phases.append(Phase(rows, 0.0, 0.0, 0.0))
             ends = {int(End.OUTSIDE): "left the domain", int(End.BLOCKED): "aground"}
             self.lost = ends.get(drifted.ended, "")
+            if self.lost:
+                return None
         self._fix = self._take_fix()
         return bool(self.random.random() >= self.settings.call_failure)
 
@@ -216,6 +221,18 @@ class Vehicle:
     def _take_fix(self) -> tuple[float, float]:
         off = self.settings.fix_error_m * self.random.standard_normal(2)
         return self.here.x + float(off[0]), self.here.y + float(off[1])
+
+
+def _place(row: Array) -> Place:
+    t, x, y, z = (float(value) for value in row)
+    return Place(x, y, z, t)
+
+
+def _phase(flown: Glided) -> Phase:
+    rows = flown.rows
+    across, rise = math.hypot(flown.true_x, flown.true_y), float(rows[-1, 3] - rows[0, 3])
+    speed = math.hypot(across, rise) / float(rows[-1, 0] - rows[0, 0])
+    return Phase(rows, math.atan2(rise, across), math.atan2(flown.true_y, flown.true_x), speed)
 
 
 def _speed(polar: Polar, way: int, angle: float) -> float:

@@ -49,7 +49,8 @@ class World:
         share = self.error / self.speed if self.speed else math.inf
         return (
             f"the forecast differs from the true current by {self.error:.3g} m/s rms, {share:.0%} of its "
-            f"{self.speed:.3g} m/s; its grid adds {self.off:.2g} m/s; divergence {self.divergence:.2g} of vorticity"
+            f"{self.speed:.3g} m/s; its grid adds {self.off:.2g} m/s; "
+            f"divergence {self.divergence:.2g} of vorticity"
         )
 
 
@@ -262,7 +263,10 @@ def _grid_places(flow: kernel.OceanGrid) -> tuple[Array, Array]:
     known, (ni, nj) = flow.extent, flow.values.shape[2:4]
     mx, my = flow.index_map.shape[:2]
     at = np.meshgrid(np.linspace(0, mx - 1, FITTED), np.linspace(0, my - 1, FITTED), indexing="ij")
-    i, j = (map_coordinates(flow.index_map[..., n], at, order=1).ravel() / (size - 1) for n, size in enumerate((ni, nj)))
+    i, j = (
+        map_coordinates(flow.index_map[..., n], at, order=1).ravel() / (size - 1)
+        for n, size in enumerate((ni, nj))
+    )
     x, y = known.x_lo + at[0].ravel() / flow.per_x, known.y_lo + at[1].ravel() / flow.per_y
     fitted = np.linalg.lstsq(_cubic(i, j), np.column_stack([x, y]), rcond=None)[0]
     share_i, share_j = np.meshgrid(np.linspace(0, 1, ni), np.linspace(0, 1, nj), indexing="ij")
