@@ -80,7 +80,7 @@ def _write_page(campaign: Campaign, runner: Runner, path: Path, show: Show) -> N
     require(len(flight.phases) > 0, f"run {number} of {policy} has not moved ({outcome.ended}); show another")
     told = (
         f"run {number}, {policy}: {outcome.ended} after {outcome.time / 60:,.0f} min, "
-        f"{outcome.surfacings} surfacings, {outcome.plans} plans, {outcome.failed} failed calls"
+        f"surfacings {outcome.surfacings}, plans {outcome.plans}, failed calls {outcome.failed}"
     )
     plans = [(since, np.asarray(plan.line)) for since, plan in flight.plans]
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain

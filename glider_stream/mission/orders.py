@@ -1,6 +1,5 @@
 """Orders: what a pilot sends to the vehicle, a list of trims or a list of waypoints."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,21 +50,17 @@ def trims_of(path: Path) -> Trims:
     return Trims(tuple(Trim(leg.glide_angle, leg.heading, leg.speed, float(leg.end[2])) for leg in path.legs))
 
 
-def waypoints_of(path: Path) -> Waypoints:
-    """Return the places where a plan comes up, with the yo that stands for the legs before each.
+def waypoints_of(path: Path, angle: float) -> Waypoints:
+    """Return the places where a plan comes up; a yo towards one goes as deep as the deepest leg before it.
 
-    A yo goes down to the deepest of those legs; its angle is that of a vehicle that goes as far through water,
-    and as far up and down, as they do.
+    All yos have the same glide `angle` [rad], as a yo file has: legs between nodes are steeper only to meet them.
     """
-    stops, depths, angles = [], [], []
-    deepest = down = across = 0.0
+    stops, depths = [], []
+    deepest = 0.0
     for n, leg in enumerate(path.legs):
         deepest = min(deepest, float(leg.start[2]), float(leg.end[2]))
-        rise = abs(float(leg.end[2] - leg.start[2]))
-        down, across = down + rise, across + rise / math.tan(abs(leg.glide_angle))
         if is_up(float(leg.end[2])) or n == len(path.legs) - 1:
             stops.append(leg.end[:2])
             depths.append(-deepest)
-            angles.append(math.atan2(down, across))
-            deepest = down = across = 0.0
-    return Waypoints(np.array(stops).reshape(-1, 2), np.array(depths), np.array(angles))
+            deepest = 0.0
+    return Waypoints(np.array(stops).reshape(-1, 2), np.array(depths), np.full(len(stops), angle))

@@ -101,7 +101,7 @@ class Replan(Policy):
         if path is None:
             return None
         by_trims = office.mission.vehicle.steering == "trims"
-        orders = trims_of(path) if by_trims else waypoints_of(path)
+        orders = trims_of(path) if by_trims else waypoints_of(path, office.angle)
         return Plan(orders, path.trajectory[:, 1:3], path.travel_time)
 
 

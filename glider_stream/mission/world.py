@@ -21,6 +21,8 @@ POINTS = 4096
 """The rms of a current is taken over so many random points of the domain's water."""
 PER_LENGTH = 6.0
 """An error is put on a grid with so many points in each of its lengths; see `World.off`."""
+PER_PERIOD = 48
+"""A forecast of a current with a period is on a grid with so many times in each period."""
 MOST_POINTS = 30_000_000
 """The largest grid of a forecast; it takes 0.5 GB."""
 FITTED = 33
@@ -95,9 +97,13 @@ class Worlds:
         if settings.rms_share == 0.0:
             return self._made(self.true, 0.0)
         field = error_field(settings, np.random.default_rng(seeds_of(self.mission, number)[0]))
+        longest, true = self.mission.arrival.longest, self._read(self.true.evaluator.flow)
         field = field._replace(scale=settings.rms_share * self._speed / _rms(field.at(*self._sample)))
-        flow = with_error(self.true, field, settings, self.mission.arrival.longest)
-        exact = self._read(self.true.evaluator.flow) + field.at(*self._sample)
+        # a coarse grid smooths the error; what the planner reads must have the size that was asked for
+        first = _rms(self._read(with_error(self.true, field, settings, longest)) - true)
+        field = field._replace(scale=field.scale * settings.rms_share * self._speed / first)
+        flow = with_error(self.true, field, settings, longest)
+        exact = true + field.at(*self._sample)
         evaluator = replace(self.true.evaluator, flow=flow)
         return self._made(replace(self.true, evaluator=evaluator), _rms(self._read(flow) - exact))
 
@@ -167,8 +173,9 @@ def _times(flow: kernel.Flow, settings: ForecastError, departure: float, longest
     steps = [longest]
     if not isinstance(settings.time_s, str):
         steps.append(settings.time_s / PER_LENGTH)
-    if isinstance(flow, kernel.Gyre) and not is_steady(flow):
-        steps.append(flow.period / (8.0 * PER_LENGTH))
+    period = None if is_steady(flow) else getattr(flow, "period", None)
+    if period is not None:
+        steps.append(period / PER_PERIOD)
     count = max(2, math.ceil(longest / min(steps)) + 1)
     times = np.linspace(departure, departure + longest, count)
     if isinstance(flow, kernel.OceanGrid) and not is_steady(flow):

@@ -70,7 +70,7 @@ const startOrStop = () => {
   if (playing) return stop();
   if (chosen.time >= total) chooseTime(0);
   playing = { before: null };
-  at("play").textContent = "\u23F8\uFE0E";
+  at("play").textContent = "\u25A0";
   at("play").setAttribute("aria-pressed", "true");
   at("play").setAttribute("aria-label", "Stop");
   requestAnimationFrame(play);
