@@ -1,8 +1,7 @@
 """What replanning is worth: campaigns of the shipped missions, and the loop without errors.
 
-`python benchmarks/missions.py box gyre strait -o benchmarks/records/missions.json` flies 100 runs of each policy of each
-mission. `ionian` needs --currents, the file that its scenario reads. Missions that the record holds already are flown
-again; others are kept.
+`python benchmarks/missions.py box gyre strait -o benchmarks/records/missions.json` flies 100 runs of each policy.
+`ionian` needs --currents, the file that its scenario reads. The record keeps its other missions.
 """
 
 import argparse

@@ -602,9 +602,9 @@ def simulate(
     """Fly many runs of a mission (a file, a shipped name or an object), and write them to each of `outputs`.
 
     An output ends in .json (table and runs), .h5 (tracks), .png, .svg or .pdf (figure), or .html (a page that
-    plays the run and policy that `show` names). With an output, runs are kept beside the first one until all are done:
-    the same call continues a stopped campaign, unless it must `restart`. Runs are shared by `processes` of this
-    machine, or by the workers of a Dask `scheduler`; neither changes a bit. A script that asks for several
+    plays the run and policy that `show` names). With an output, runs are kept beside the first one until all are
+    done: the same call continues a stopped campaign, unless it must `restart`. Runs are shared by `processes` of
+    this machine, or by the workers of a Dask `scheduler`; neither changes a bit. A script that asks for several
     processes needs `if __name__ == "__main__":` around the call.
 
     Examples:

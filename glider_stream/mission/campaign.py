@@ -1,5 +1,6 @@
 """Campaigns: many runs of a mission, in parallel, that survive a kill; the table of its policies."""
 
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -7,9 +8,9 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from importlib.metadata import version
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any
 
 from ..base.cores import usable_cores
@@ -242,14 +243,23 @@ def run_there(work: tuple[Mission, dict[str, str]], number: int) -> Run:
     return run_here(mission, number)
 
 
-def _ignore_interrupt() -> None:
-    """Let only the first process answer Ctrl-C: it lets the others finish their runs."""
+def _begin_worker() -> None:
+    """Let only the first process answer Ctrl-C, which lets this one finish its run; end when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent has ended; a pool's processes would wait for work for ever."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _in_processes(mission: Mission, waiting: list[int], processes: int) -> Iterator[Run]:
     # a forked process would inherit the locks of threads that it does not have
-    pool = ProcessPoolExecutor(min(processes, len(waiting)), get_context("spawn"), _ignore_interrupt)
+    pool = ProcessPoolExecutor(min(processes, len(waiting)), get_context("spawn"), _begin_worker)
     try:
         for future in as_completed([pool.submit(run_here, mission, number) for number in waiting]):
             yield future.result()

@@ -142,16 +142,12 @@ class _Run:
             return "no plan"
         while True:
             orders = vehicle.dive(orders)
-            late = vehicle.here.t - departure > self.mission.arrival.longest
-            if vehicle.lost:
-                return vehicle.lost
-            if late:
-                return "out of time"
-            if self._off() <= self.mission.arrival.radius_m:
-                return "arrived"
+            if ended := self._now(departure):
+                return ended
             called = vehicle.call()
-            if called is None:
-                return vehicle.lost
+            # the vehicle may drift to the goal, or ashore
+            if ended := self._now(departure):
+                return ended
             self.failed += not called
             new = self._plan() if called and self.policy.replans else None
             self.without += called and self.policy.replans and new is None
@@ -161,6 +157,15 @@ class _Run:
                     return "missed the goal"
                 # without a list the vehicle heads for the goal until a call brings a plan
                 orders = self.office.towards(self.office.goal[None, :2])
+
+    def _now(self, departure: float) -> str:
+        """Return how the run ends here and now; empty if it goes on."""
+        arrival = self.mission.arrival
+        if self.vehicle.lost:
+            return self.vehicle.lost
+        if self.vehicle.here.t - departure > arrival.longest:
+            return "out of time"
+        return "arrived" if self._off() <= arrival.radius_m else ""
 
     def _plan(self) -> Orders | None:
         plan = self.policy.plan(self.office, self.vehicle.fix)

@@ -124,7 +124,7 @@ class PilotSettings:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A run arrives if the vehicle comes up within `radius_m` of the goal, at most `longest_hours` later."""
+    """A run arrives if the vehicle is up within `radius_m` of the goal, at most `longest_hours` later."""
 
     radius_m: float
     longest_hours: float

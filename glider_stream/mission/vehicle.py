@@ -160,7 +160,7 @@ class Vehicle:
         self.here = _place(rows[-1])
         if len(rows) > 1:
             self.phases.append(_phase(flown))
-            self.spent += self.energy.hotel * (rows[-1, 0] - rows[0, 0]) + self.energy.trim
+            self.spent += self.energy.hotel * float(rows[-1, 0] - rows[0, 0]) + self.energy.trim
             pump = self.energy.inflection(rows[0, 3])
             self.spent += float(pump) if climbs and pump is not None else 0.0
         if flown.ended == End.OUTSIDE:
@@ -186,15 +186,12 @@ class Vehicle:
         self._fix, before = self._take_fix(), self._fix
         if time > 0.0:
             way = self._fix[0] - before[0] - self._own[0], self._fix[1] - before[1] - self._own[1]
-            self._current = way[0] / time, way[1] / time
+            self._current = float(way[0] / time), float(way[1] / time)
 
     # at the surface
 
-    def call(self) -> bool | None:
-        """Drift during a call, and take a fix at its end; return whether the call brings new orders.
-
-        Return None if the vehicle is lost.
-        """
+    def call(self) -> bool:
+        """Drift during a call, and take a fix at its end; return whether the call brings new orders."""
         seconds = 60.0 * self.settings.call_minutes
         if seconds > 0.0:
             evaluator = self.problem.evaluator
@@ -209,7 +206,7 @@ class Vehicle:
             ends = {int(End.OUTSIDE): "left the domain", int(End.BLOCKED): "aground"}
             self.lost = ends.get(drifted.ended, "")
             if self.lost:
-                return None
+                return False
         self._fix = self._take_fix()
         return bool(self.random.random() >= self.settings.call_failure)
 

@@ -57,8 +57,7 @@ Runs = Mapping[str, Sequence[Flown]]
 def plot_campaign(problem: Problem, runs: Runs, radius: float, depth: float, title: str) -> "Figure":
     """Draw the runs of each policy, over the true current at a `depth` [m]; within `radius` [m] a run arrives.
 
-    Of `problem` the true flow and terrain, the box `lo`, `hi`, `goal` [m], the `departure` [s] and `to_lonlat` are
-    read.
+    Of `problem` the true flow and terrain, the box, start and goal, the departure and `to_lonlat` are read.
     """
     assert problem.start is not None
     assert problem.goal is not None

@@ -11,7 +11,7 @@ from helpers.small import SCENARIO
 MISSION = """\
 [scenario]
 name = "small.toml"
-set = ["steering.method=flow-map", "sampling.shape=[6, 6, 3]"]
+set = ["steering.method=flow-map", "neighbours.kind=reachable", "sampling.shape=[7, 7, 3]"]
 
 [forecast_error]
 rms_share = 0.3
@@ -33,7 +33,7 @@ waypoint_radius_m = 30.0
 
 [pilot]
 policies = ["open-loop", "replan", "straight", "depth-averaged", "omniscient"]
-most_hours = 0.06
+most_hours = 0.08
 
 [arrival]
 radius_m = 40.0

@@ -65,7 +65,7 @@ def test_without_errors_waypoints_arrive_too_and_take_longer(folder):
 
 
 def test_with_errors_only_replanning_finds_the_goal_again(folder):
-    found = [flown(folder, {}, number) for number in range(4)]
+    found = [flown(folder, {"forecast_error.rms_share": 0.8}, number) for number in range(3)]
     assert all(run["replan"].arrived for run in found)
     assert not all(run["open-loop"].arrived for run in found)
     assert {outcome.ended for run in found for outcome in run.values()} <= set(ENDS)
@@ -129,7 +129,7 @@ def test_the_mean_current_of_a_dive_is_the_fix_less_the_dead_reckoned_way(folder
     moved = np.array(vehicle.here[:2]) - made.worlds.true.start[:2]
     took = vehicle.here.t - made.worlds.true.departure
     assert vehicle.fix.current == pytest.approx(tuple((moved - way) / took), abs=1e-9)
-    assert 0.0 < math.hypot(*vehicle.fix.current) < 0.5
+    assert 0.01 < math.hypot(*vehicle.fix.current) < 0.7
 
 
 def test_a_biased_compass_looks_like_a_current(folder):
