@@ -127,10 +127,13 @@ class Cluster:
 
         Chunks of a lost worker are done again.
         """
+        yield from self._guarded(self._evaluated(problem, position, source, batch_pairs))
+
+    def _evaluated(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
         # degrees are computed here, so that the frame need not be sent
         work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
         size = nodes_of_batch(problem, problem.legs(position), batch_pairs)
-        yield from self.each(evaluate, work, np.array_split(source, range(size, len(source), size)))
+        yield from self._each(evaluate, work, np.array_split(source, range(size, len(source), size)))
 
     def each(
         self, function: Callable[[Given, Item], Result], work: Given, items: Iterable[Item]
@@ -139,9 +142,12 @@ class Cluster:
 
         Items of a lost worker are done again. InputError if the cluster fails.
         """
+        yield from self._guarded(self._each(function, work, items))
+
+    def _guarded(self, results: Iterator[Result]) -> Iterator[Result]:
+        """Yield results; an error of the cluster becomes an InputError."""
         try:
-            self.client.wait_for_workers(1, timeout=WAIT)
-            yield from self._each(function, work, items)
+            yield from results
         except InputError:
             raise
         except Exception as error:
@@ -154,6 +160,7 @@ class Cluster:
     def _each(
         self, function: Callable[[Given, Item], Result], work: Given, items: Iterable[Item]
     ) -> Iterator[Result]:
+        self.client.wait_for_workers(1, timeout=WAIT)
         sent = self.client.scatter(work, broadcast=True, hash=False)
         left = iter(items)
         waiting = _distributed().as_completed()
