@@ -96,7 +96,7 @@ def measure(problem: Problem, method: str, controls: int | None) -> Row:
 
 def collect(record: Path, quick: bool) -> list[Row]:
     """All rows, those that the record has and those that it lacks."""
-    runs, controls, shape = (3, (4, 16), [5, 5, 4]) if quick else (RUNS, CONTROLS, [10, 10, 10])
+    runs, controls, shape = (2, (4, 16), [5, 5, 4]) if quick else (RUNS, CONTROLS, [10, 10, 10])
     here = {
         "machine": platform.processor() or platform.machine(),
         "threads": numba.get_num_threads(),
@@ -158,7 +158,7 @@ def over_flow_map(rows: list[Row]) -> list[Row]:
 def arguments(document: str) -> argparse.Namespace:
     """What each of the three scripts is told."""
     parser = argparse.ArgumentParser(description=document.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="three small runs, into a record of their own")
+    parser.add_argument("--quick", action="store_true", help="two small runs, into a record of their own")
     parser.add_argument("--record", type=Path, help=f"the rows, to go on with; {RECORD.name} if not given")
     parser.add_argument("-o", "--output", type=Path, required=True, help="the figure: PNG, SVG or PDF")
     options = parser.parse_args()

@@ -1,18 +1,35 @@
 """Small waters and gliders that several tests share: few kinds of flow, so that few kernels are compiled."""
 
 import math
+import os
 
 import numpy as np
 import pytest
 
 from glider_stream.kernels.flow import Extent, OceanGrid
-from glider_stream.kernels.terrain import OpenWater
+from glider_stream.kernels.terrain import OpenWater, Seabed
+from glider_stream.roadmap.builder import warm_up
 from glider_stream.roadmap.evaluator import Evaluator
 from glider_stream.roadmap.steering import IntegrationSettings, StreamlineMethod
+from glider_stream.scenario import read_scenario
 from glider_stream.vehicle.polar import polar
 from glider_stream.vehicle.presets import PRESETS
 from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, Uniform, Vortex, Vortices
 from glider_stream.water.sampled import sample_flow
+
+MANY_TESTS = 1000
+COMPILED_BY = {
+    "gw0": [("seed-box", ["steering.method=flow-map"])],
+    "gw1": [("seed-box", ["steering.refine=true"]), ("swinging-gyre", ["steering.method=flow-map"])],
+}
+"""What each of two processes compiles before all tests; otherwise both would compile the same kernels."""
+
+
+def pytest_collection_finish(session):
+    if len(session.items) > MANY_TESTS:
+        for scenario, overrides in COMPILED_BY.get(os.environ.get("PYTEST_XDIST_WORKER"), ()):
+            warm_up(read_scenario(scenario, overrides).problem())
+
 
 HEIGHTS = (-250.0, 0.0)
 FIVE = (
@@ -94,6 +111,13 @@ def ocean_of():
         )
 
     return build
+
+
+@pytest.fixture(scope="session")
+def deep_sea():
+    """A seabed that closes nothing: with it a flow of `ocean_of` needs no other kernels than a real file."""
+    bottom, ends = np.full((2, 2), -1e4), np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], indexing="ij"), axis=-1)
+    return Seabed(bottom, 0.0, ends, 1 / 1e4, 1 / 1e4, -5e3, -5e3, bottom)
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ from ..base.untrusted import check_file
 from ..kernels.terrain import Seabed
 from .frame import LocalFrame
 from .ocean.bottom import Bottom
+from .ocean.grid import Grid
 from .ocean.names import Names
 
 LAND = 0.0
@@ -91,25 +92,26 @@ class Raster:
         self.bottom = np.full(tuple(self.count), -np.inf)
         self.land = np.zeros(tuple(self.count), dtype=bool)
 
-    def _corners(self) -> tuple[Array, Array]:
-        """Return x, y (2 ni, 2 nj) [m] of the corners of the cells about the points, moved outward by WALL."""
-        axes = []
-        for n in range(2):
-            middle = self.low[n] + self.step * np.arange(self.count[n])
-            half = self.step / 2 + WALL
-            axes.append(np.stack([middle - half, middle + half], axis=1).ravel())
-        x, y = np.meshgrid(*axes, indexing="ij")
-        return x, y
+    def _indices(self, grid: Grid) -> tuple[Array, Array]:
+        """Return the least and greatest fractional indices (ni, nj, 2) of a grid within WALL of each cell.
+
+        Cells share their corners. Beyond a corner the indices go on as they change along the cell's sides.
+        """
+        x, y = (self.low[n] + self.step * (np.arange(self.count[n] + 1) - 0.5) for n in range(2))
+        at = grid.indices(self.frame, *np.meshgrid(x, y, indexing="ij"))
+        corners = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]])
+        first, before, after, last = corners
+        along_x = np.maximum(np.abs(after - first), np.abs(last - before))
+        along_y = np.maximum(np.abs(before - first), np.abs(last - after))
+        wall = WALL / self.step * (along_x + along_y)
+        return corners.min(axis=0) - wall, corners.max(axis=0) + wall
 
     def add_bottom(self, bottom: Bottom) -> None:
         """Raise each cell to the highest point of the bottom that a place in it may read."""
         from scipy.ndimage import maximum_filter  # importing it takes 0.05 s, and few runs need it
 
-        at = bottom.grid.indices(self.frame, *self._corners())
-        ni, nj = self.count
-        at = at.reshape(ni, 2, nj, 2, 2).transpose(0, 2, 1, 3, 4).reshape(ni, nj, 4, 2)
+        low, high = self._indices(bottom.grid)
         last = np.array(bottom.height.shape[::-1]) - 1
-        low, high = at.min(axis=2), at.max(axis=2)
         first = np.floor(low if bottom.between else low + 0.5)
         end = np.ceil(high) if bottom.between else np.floor(high + 0.5)
         first, end = (np.clip(part, 0, last).astype(np.int64) for part in (first, end))

@@ -31,8 +31,8 @@ def test_the_scripts_draw_and_go_on_where_they_were(tmp_path, monkeypatch, capsy
         run(monkeypatch, script, "--quick", "--record", record, "-o", tmp_path / f"{script}.svg")
         assert (tmp_path / f"{script}.svg").stat().st_size > 5000
     rows = [json.loads(line) for line in record.read_text().splitlines()]
-    # three fields; three methods of two numbers of controls each, and the flow map
-    assert len({(row["seed"], row["method"], row["controls"]) for row in rows}) == len(rows) == 3 * 7
+    # two fields; three methods of two numbers of controls each, and the flow map
+    assert len({(row["seed"], row["method"], row["controls"]) for row in rows}) == len(rows) == 2 * 7
     first = record.read_text()
     record.write_text("".join(line + "\n" for line in first.splitlines()[:10]))
     run(monkeypatch, SCRIPTS[0], "--quick", "--record", record, "-o", tmp_path / "again.svg")
@@ -40,7 +40,7 @@ def test_the_scripts_draw_and_go_on_where_they_were(tmp_path, monkeypatch, capsy
     timeless = [{key: value for key, value in row.items() if key != "wall_s"} for row in rows]
     assert [{key: value for key, value in row.items() if key != "wall_s"} for row in again] == timeless
     edges = {(row["seed"], row["method"], row["controls"]): row["edges"] for row in rows}
-    for seed in range(3):
+    for seed in range(2):
         assert edges[seed, "flow map", None] >= edges[seed, "streamline", 16] > edges[seed, "surface", 16]
 
 

@@ -29,6 +29,7 @@ from glider_stream.water.ocean.flow import slots
 pytestmark = pytest.mark.slow
 
 GYRE = ["flow.period=900.0", "sampling.shape=[8, 4, 3]"]
+FEW = ["flow.period=900.0", "sampling.shape=[5, 3, 3]"]
 FLOWS = {
     "reachable": GYRE,
     "limited": [*GYRE, "neighbours.limit=12"],
@@ -249,19 +250,19 @@ def test_fewer_legs_are_found_at_their_own_times(gyre):
 
 def test_when_to_leave(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    opened = open_scenario("swinging-gyre", GYRE)
+    opened = open_scenario("swinging-gyre", FEW)
     found = opened.when_to_leave((0.0, 300.0), every=150.0, figure="leave.png")
     assert [path.departure for path in found.paths] == [0.0, 150.0, 300.0]
     assert found.best.travel_time == min(path.travel_time for path in found.paths)
     for path in found.paths[1:3]:
-        again = clock([*GYRE, f"query.departure={path.departure}"]).query()
+        again = clock([*FEW, f"query.departure={path.departure}"]).query()
         assert again.travel_time == pytest.approx(path.travel_time, abs=0.05)
         assert np.linalg.norm(flown(opened.problem.evaluator.flow, path.as_dict())[-1] - path.goal) < 0.1
     by = found.paths[2].departure + found.paths[2].travel_time + 1.0
     late = opened.when_to_leave((0.0, 300.0), every=150.0, arrive_by=by)
     assert late.latest.departure == 300.0
     assert late.latest.departure + late.latest.travel_time <= by
-    sets = [part for one in GYRE for part in ("--set", one)]
+    sets = [part for one in FEW for part in ("--set", one)]
     asked = "--depart-between", "0", "300", "--every", "150", "--json"
     asked = command(capsys, "plan", "swinging-gyre", *sets, *asked)
     rows = strict_json(asked.out)
@@ -295,11 +296,11 @@ def test_plan_from_the_command_line(tmp_path, capsys, monkeypatch, gyre):
     assert FROZEN in still.out
 
 
-def test_no_route_goes_beyond_the_last_current(ocean_of, glide, evaluator):
+def test_no_route_goes_beyond_the_last_current(ocean_of, deep_sea):
     """Where the forecast ends before any way gets there, that is said; nothing is extrapolated."""
     problem = read_scenario("swinging-gyre", [*GYRE, "query.start=[-150.0,-150.0,0.0]"]).problem()
     flow = ocean_of(lambda i, j, z, t: (0.05 + 0 * i, 0.02 * np.sin(t / 300) + 0 * i))
-    changed = replace(problem.evaluator, flow=flow)
+    changed = replace(problem.evaluator, flow=flow, terrain=deep_sea)
     start, goal = np.array([-150.0, -150.0, 0.0]), np.array([150.0, 150.0, 0.0])
     lo, hi = np.array([-180.0, -180.0, -200.0]), np.array([180.0, 180.0, 0.0])
     axes = np.linspace(-160, 160, 5), np.linspace(-160, 160, 5), np.array([-200.0, -100.0, 0.0])
@@ -316,7 +317,7 @@ def test_no_route_goes_beyond_the_last_current(ocean_of, glide, evaluator):
 
 
 @pytest.fixture(scope="module")
-def strait(ocean_of):
+def strait(ocean_of, deep_sea):
     """A current against the way until 1,050 s, then with it; a glider can hold its place, but not wait."""
     times = np.array([0.0, 1050.0, 1070.0, 4000.0])
     flow = ocean_of(lambda i, j, z, t: (0 * i, 0 * i))
@@ -333,7 +334,7 @@ def strait(ocean_of):
     )
     problem = read_scenario("swinging-gyre", [*GYRE, "neighbours.kind=all"]).problem()
     start, goal = np.array([-195.0, 0.0, 0.0]), np.array([195.0, 0.0, 0.0])
-    there = replace(problem.evaluator, flow=flow)
+    there = replace(problem.evaluator, flow=flow, terrain=deep_sea)
     box = np.array([-200.0, -50.0, -100.0]), np.array([200.0, 50.0, 0.0])
     nodes = np.array([[-195.0, 0.0, -100.0], [195.0, 0.0, -100.0], start, goal])
     return replace(problem, evaluator=there, start=start, goal=goal, lo=box[0], hi=box[1]), nodes

@@ -186,12 +186,15 @@ def test_files_without_polygons_are_refused(tmp_path, text, words):
     assert "bad.geojson" in str(refusal.value)
 
 
-SCENARIO = """\
-[flow]
+CURRENT = {"uo": 0.15, "vo": -0.1}
+EVEN = """\
 kind = "uniform"
 u = 0.15
 v = -0.1
-
+"""
+SCENARIO = f"""\
+[flow]
+{EVEN}
 [terrain]
 bathymetry = "chart.nc"
 clearance = 3.0
@@ -250,7 +253,13 @@ def test_no_leg_touches_what_the_files_close(tmp_path, monkeypatch):
     written(tmp_path, chart())
     zone = square(12.515, 55.775, 0.003)
     zones(tmp_path, zone)
-    (tmp_path / "sound.toml").write_text(SCENARIO)
+    everywhere = ("depth", "lat", "lon"), np.ones((2, LAT.size, LON.size))
+    even = {name: (everywhere[0], speed * everywhere[1], {"units": "m/s"}) for name, speed in CURRENT.items()}
+    depth = {"depth": ("depth", [0.0, 60.0], {"units": "m", "positive": "down"})}
+    written(tmp_path, chart().assign(even).assign_coords(depth).drop_vars("elevation"), "even.nc")
+    # the kernels of a current file are compiled for other tests, too
+    scenario = SCENARIO.replace(EVEN, 'kind = "netcdf"\nfile = "even.nc"\n')
+    (tmp_path / "sound.toml").write_text(scenario)
     problem = read_scenario("sound.toml").problem()
     road = build_roadmap(problem)
     assert road.target.size > 2000
