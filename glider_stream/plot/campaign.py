@@ -75,7 +75,7 @@ def plot_campaign(problem: Problem, runs: Runs, radius: float, depth: float, tit
             ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
             _draw_goal(ax, frame, problem.goal, radius)
         high = (frame.y[1] - frame.y[0]) / (frame.x[1] - frame.x[0])
-        look = {"aspect": 35 * min(1.0, high), "shrink": min(1.0, 1.05 * high), "pad": 0.02}
+        look: dict[str, Any] = {"aspect": 35 * min(1.0, high), "shrink": min(1.0, 1.05 * high), "pad": 0.02}
         figure.colorbar(image, ax=maps, label="True current (m/s)", **look)
         _draw_tracks(maps[0], frame, runs)
         maps[0].set_title(f"(a) Tracks over the true current at {depth:.4g} m{when}")
