@@ -609,8 +609,8 @@ def simulate(
 
     Examples:
         >>> campaign = planner.simulate("small-mission.toml", 2)
-        >>> [row.policy for row in campaign.rows if row.arrived.value == 1.0]
-        ['replan']
+        >>> [row.arrived.value for row in campaign.rows if row.policy == "replan"]
+        [1.0]
     """
     from .mission.campaign import forget
     from .mission.campaign import simulate as fly
