@@ -1,6 +1,7 @@
 """The command line. The body of each command is one library call; heavy modules are loaded only when needed."""
 
 import json
+import math
 import os
 import re
 import sys
@@ -44,6 +45,30 @@ def key_and_value(text: str) -> tuple[str, Any]:
     if value.isdecimal():
         return key, int(value)
     return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
+
+
+def fix_place(text: str) -> tuple[float, float, str]:
+    """Return two numbers and a time with commas between them."""
+    parts = text.split(",")
+    try:
+        x, y = (float(part) for part in parts[:2])
+    except ValueError:
+        parts = []
+    if len(parts) != 3 or not parts[2].strip():
+        form = "a fix, LON,LAT,TIME, such as 18.4,38.0,2024-11-20T18:00"
+        raise click.BadParameter(f"{text!r} is not {form}")
+    return x, y, parts[2].strip()
+
+
+def two_numbers(text: str) -> tuple[float, float]:
+    """Return two finite numbers with a comma between them."""
+    try:
+        first, second = (float(part) for part in text.split(","))
+    except ValueError:
+        first = second = math.nan
+    if not (math.isfinite(first) and math.isfinite(second)):
+        raise click.BadParameter(f"{text!r} is not two numbers with a comma between, such as 0.12,-0.05")
+    return first, second
 
 
 class Percentage(click.ParamType[float]):
@@ -274,6 +299,92 @@ def plan(scenario: str, overrides: tuple[str, ...], **options: Any) -> None:
     from .opened import open_scenario
 
     _answer(lambda: open_scenario(scenario, overrides), **options)
+
+
+@cli.command()
+@click.argument("plan", type=FILE)
+@click.option(
+    "--fix",
+    required=True,
+    type=fix_place,
+    metavar="LON,LAT,TIME",
+    help="Where and when the vehicle surfaced: degrees, or X,Y in metres; a date (UTC), or seconds of the flow.",
+)
+@click.option(
+    "--dac",
+    type=two_numbers,
+    metavar="EAST,NORTH",
+    help="The depth-averaged current of the last dive [m/s], to compare with the forecast.",
+)
+@click.option("--currents", multiple=True, type=FILE, help="A newer current file; repeatable.")
+@click.option("--roadmap", type=FILE, help="The roadmap to search, if not the one that PLAN names.")
+@click.option("--scenario", help="The scenario, if PLAN does not name one.")
+@click.option(
+    "--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key of the scenario."
+)
+@click.option(
+    "--tolerance",
+    type=Percentage(),
+    default="5%",
+    show_default=True,
+    help="The old list is good while flying it on costs at most this much more in all.",
+)
+@click.option("--all-nodes", is_flag=True, help="Search all nodes, not only those near the roadmap's best ways.")
+@click.option("--polish", is_flag=True, help="Polish the new plan, as in `query`.")
+@click.option("--thin", type=float, metavar="METRES", help="Join legs of the new plan, as in `query`.")
+@click.option("--most-yos", type=int, help="The rule of surfacing, if not the old plan's.")
+@click.option("--most-hours", type=float, help="The rule of surfacing, if not the old plan's.")
+@click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write, as in `query`.")
+@click.option("--window-hours", type=float, metavar="H", help="Length of exported windows; 12 if not given.")
+@click.option("--waypoints", type=int, metavar="N", help="The most waypoints in a goto list; 8 if not given.")
+@click.option(
+    "--arrival-radius",
+    type=float,
+    metavar="METRES",
+    help="A waypoint, and the goal, is reached at this distance.",
+)
+@JSON
+def replan(
+    plan: Path,
+    fix: tuple[float, float, str],
+    dac: tuple[float, float] | None,
+    currents: tuple[Path, ...],
+    roadmap: Path | None,
+    scenario: str | None,
+    overrides: tuple[str, ...],
+    tolerance: float,
+    most_yos: int | None,
+    most_hours: float | None,
+    window_hours: float | None,
+    waypoints: int | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Plan anew from a position fix to the goal of PLAN.
+
+    PLAN is a JSON file from `query`, `plan` or `replan`. The answer says what changes, what the old list would
+    do, and until when it is good if the next call fails. Exit code 1 if no path exists.
+    """
+    from . import planner
+    from .search.surfacing import Surfacing
+
+    if roadmap is not None and scenario is not None:
+        raise click.UsageError("--roadmap and --scenario do not go together; leave one of them out")
+    given = {"window_hours": window_hours, "most_waypoints": waypoints}
+    options |= {name: value for name, value in given.items() if value is not None}
+    rule = None if most_yos is None and most_hours is None else Surfacing(most_yos, most_hours)
+    answer = planner.replan(
+        plan, fix[:2], fix[2], source=roadmap or scenario, overrides=overrides, dac=dac,
+        currents=currents or None, tolerance=tolerance, surfacing=rule, **options,
+    )  # fmt: skip
+    for note in answer.notes:
+        say(f"note: {note}", error=True)
+    if as_json:
+        _write_json(answer.as_dict())
+    else:
+        say(answer, error=not answer.new.found)
+    if not answer.new.found:
+        sys.exit(1)
 
 
 def _check_together(front: bool, departures: bool, alone: bool, spacing: bool) -> None:
@@ -591,6 +702,60 @@ def calibrate(
     found = planner.calibrate(
         dives, output, preset=preset, columns={name: str(column) for name, column in columns}
     )
+    if as_json:
+        _write_json(found.as_dict())
+    else:
+        say(found)
+
+
+@cli.command()
+@click.argument("dives", type=FILE)
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    type=key_and_value,
+    metavar="WHAT=COLUMN",
+    help="A column or variable with another name: t_start, lon_start, ..., heading, horizontal, east, north, ...",
+)
+@click.option(
+    "--declination", type=float, default=0.0, show_default=True, help="Degrees to add to magnetic headings."
+)
+@click.option("--attack", type=float, default=3.0, show_default=True, help="A track's angle of attack [degrees].")
+@click.option("--fix-error", type=float, default=10.0, show_default=True, help="Standard error of a fix [m].")
+@click.option(
+    "--speed-error",
+    type=Percentage(),
+    default="5%",
+    show_default=True,
+    help="Standard error of the speed through water; at least 10% where a track's depth and pitch give it.",
+)
+@click.option(
+    "--heading-error", type=float, default=3.0, show_default=True, help="Standard error of headings [degrees]."
+)
+@click.option("-o", "--output", type=FILE, help="A CSV or JSON file to write.")
+@JSON
+def currents(
+    dives: Path,
+    columns: tuple[tuple[str, Any], ...],
+    declination: float,
+    attack: float,
+    fix_error: float,
+    speed_error: float,
+    heading_error: float,
+    output: Path | None,
+    as_json: bool,
+) -> None:
+    """Find the depth-averaged current of each of DIVES, with its error.
+
+    DIVES is a CSV file with a line for each dive, or a NetCDF file of a track with depth, heading and pitch.
+    """
+    from . import planner
+
+    found = planner.currents(
+        dives, output, columns={name: str(column) for name, column in columns}, declination=declination,
+        attack=attack, fix_error=fix_error, speed_error=speed_error, heading_error=heading_error,
+    )  # fmt: skip
     if as_json:
         _write_json(found.as_dict())
     else:

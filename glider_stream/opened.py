@@ -1,48 +1,68 @@
 """An opened roadmap: roadmap, problem and searches are each made once, when they are first needed."""
 
+import tomllib
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as File
 from threading import RLock
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from .base.arrays import Array
+from .base.clock import moment
+from .base.errors import InputWarning
 from .base.output import check_output
 from .base.settings import require
 from .pilot.card import Card
 from .pilot.card import card as card_of
 from .pilot.export import check_export, check_legs, export_path
+from .pilot.replan import TOLERANCE, Replan, compared, good_until_of, shown
 from .pilot.route_files import read_drawn
 from .pilot.score import Score
 from .pilot.score import score as score_of
+from .pilot.slocum import RADIUS
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
 from .roadmap.builder import node_positions
 from .roadmap.density import Density, density_of
+from .roadmap.inputs import settings_sha256
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.slices import SlicedRoadmap
 from .roadmap.store import read_any_roadmap
-from .scenario import Scenario, read_scenario, scenario_of, shipped_scenarios
+from .scenario import (
+    Scenario,
+    read_scenario,
+    scenario_from_text,
+    scenario_of,
+    shipped_scenarios,
+    with_currents,
+)
 from .search.answer import Ends, best_path, front, planner_of
-from .search.assembly import RoutePlanner
+from .search.assembly import Assembly, RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
+from .search.flown_on import check_plan, flown_on, located
 from .search.least_time import GreatestSpeeds, least_cost
-from .search.path import Path, load_path
+from .search.path import SURFACE, Origin, Path, load_path
+from .search.query import Planner
 from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
+from .search.time_dependent import ClockPlanner
 from .search.trade_off import TradeOff
 from .search.why_not import no_edges
 from .vehicle.polar import polar
-from .water.domain import GeographicDomain, Point
+from .water.domain import GeographicDomain, Point, domain_from_table
 from .water.inspect import is_steady
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+NEAR = 0.1
+"""A replan with the clock running searches the nodes on ways at most this share longer than the best way, by the
+legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands."""
 
 
 def split_outputs(outputs: Sequence[str | File], refines: bool) -> tuple[list[str | File], list[str | File]]:
@@ -99,7 +119,11 @@ class OpenedScenario:
     def planner(self, surfacing: Surfacing | None = None) -> RoutePlanner:
         """Return the planner whose paths keep a rule of surfacing; None stands for the scenario's own rule."""
         rule = self._surfacing if surfacing is None else surfacing
-        return self._once(rule, RoutePlanner, lambda: planner_of(self.problem, self._roadmap, rule))  # type: ignore[type-abstract]
+        return self._once(rule, RoutePlanner, lambda: self._planner_of(self.problem, rule))  # type: ignore[type-abstract]
+
+    def _planner_of(self, problem: Problem, rule: Surfacing) -> RoutePlanner:
+        road = self._roadmap
+        return planner_of(problem, road, rule, self.position if road is None else None)
 
     def _leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
         """Return the `planner` for routes that leave at a time; None stands for the scenario's departure."""
@@ -112,7 +136,7 @@ class OpenedScenario:
         fits = not (changes and isinstance(road, Roadmap))
         legs = f"frozen paths over this roadmap leave at {problem.departure:g} s"
         require(fits, f"{legs}; got {depart}; leave `query.frozen` out, or build it with that `query.departure`")
-        return planner_of(problem.leaving(since), road, self._surfacing if surfacing is None else surfacing)
+        return self._planner_of(problem.leaving(since), self._surfacing if surfacing is None else surfacing)
 
     def _problem_of(self, route: Path) -> Problem:
         """Return the problem at the time when a route leaves, if the route has one."""
@@ -170,9 +194,30 @@ class OpenedScenario:
             >>> len(path.legs), round(path.travel_time)
             (3, 430)
         """
+        split_outputs(outputs, within is not None or seconds is not None)  # before the water is read
+        planner = self._leaving(depart, surfacing)
+        route: dict[str, Any] = {"outputs": outputs, "most_energy": most_energy, "polish": polish, "thin": thin}
+        route |= {"within": within, "seconds": seconds, "progress": progress, "window_hours": window_hours}
+        route |= {"most_waypoints": most_waypoints, "arrival_radius": arrival_radius}
+        return self._route(planner, self._ends(start, goal), **route)
+
+    def _route(
+        self,
+        planner: RoutePlanner,
+        ends: Ends,
+        *,
+        outputs: Sequence[str | File] = (),
+        most_energy: float | None = None,
+        polish: bool = False,
+        within: float | None = None,
+        seconds: float | None = None,
+        thin: float | None = None,
+        progress: Callable[[str], None] = lambda line: None,
+        **written: Any,
+    ) -> Path:
+        """Return the cheapest path between two `ends` of a planner, and write it; see `query`."""
         asked = None if within is None and seconds is None else Asked(within, seconds)
         outputs, roadmaps = split_outputs(outputs, asked is not None)
-        planner, ends = self._leaving(depart, surfacing), self._ends(start, goal)
 
         def refine(path: Path, polish: Callable[[Path], Path] | None) -> Path:
             assert asked is not None
@@ -191,16 +236,171 @@ class OpenedScenario:
         )
         if path.found and path.legs:
             path = replace(path, least=self._least(path, planner.problem.departure))
+        path = replace(path, origin=self._origin(planner))
         check_legs(path, outputs)
         notes: list[str] = []
-        written = {
-            "window_hours": window_hours,
-            "most_waypoints": most_waypoints,
-            "arrival_radius": arrival_radius,
-        }
         for output in outputs:
             export_path(path, output, notes.append, **written)
         return replace(path, notes=(*path.notes, *notes))
+
+    def replan(
+        self,
+        path: str | File | Path,
+        fix: tuple[float, float],
+        time: Moment,
+        *,
+        dac: tuple[float, float] | None = None,
+        currents: str | File | Sequence[str | File] | None = None,
+        tolerance: float = TOLERANCE,
+        surfacing: Surfacing | None = None,
+        arrival_radius: float | None = None,
+        all_nodes: bool = False,
+        **options: Any,
+    ) -> Replan:
+        """Return a new plan from a position fix at the surface to the goal of an old plan, and what becomes of
+        that.
+
+        `path`: the old plan, a path file or an object. `fix`: lon, lat [degrees], or x, y [m] where the domain
+        is in metres; `time`: when, in seconds of the flow, or an ISO 8601 text (UTC). `dac`: the depth-averaged
+        current of the last dive, east and north [m/s], which is compared with the forecast. `currents`: newer
+        current files; the nodes are kept, and legs are found as the clock runs. The old list is good as long as
+        flying it on, and planning anew after that, costs at most the share `tolerance` more than the new plan.
+        `surfacing`: None stands for the old plan's rule. The goal counts as reached within `arrival_radius` [m].
+        Where the clock runs and a roadmap has legs of one departure, only the nodes are searched that these legs
+        connect with a way at most NEAR longer than their best, unless `all_nodes`. `options` are those of
+        `query` for a route and its files: outputs, polish, thin, within, seconds, progress, window_hours,
+        most_waypoints.
+
+        Examples:
+            >>> path = road.query()
+            >>> answer = road.replan(path, (-60.0, 60.0), 200.0)
+            >>> answer.new.found, answer.flown.first
+            (True, 3)
+
+        """
+        old = path if isinstance(path, Path) else load_path(path)
+        require(
+            len(old.legs) > 0, "the plan holds no leg, so nothing is left to be planned anew; plan a route first"
+        )
+        require(0 <= tolerance < np.inf, f"the tolerance must be from 0 % up; got {tolerance:.0%}")
+        before, since = self._at_fix(old, time)
+        place = self._point((*fix, 0.0))
+        now = self if currents is None else self._renewed(currents, before, place, old.goal)
+        leaves = now.problem if currents is not None else before
+        check_moment(leaves, "fix", "name newer currents with --currents")
+        leaves.check_point(place, "fix")
+        planner = now._leaving(leaves.departure, _rule_of(old) if surfacing is None else surfacing)
+        wide, share = planner, 1.0
+        if not all_nodes:
+            planner, share = now._near_ways(planner, place, old.goal)
+        radius = self._radius(old.goal, arrival_radius)
+        arrived = float(np.linalg.norm(place - old.goal)) <= radius
+        if arrival_radius is not None:
+            options["arrival_radius"] = arrival_radius
+        ends = place, place if arrived else old.goal
+        new = now._route(planner, ends, **options)
+        if share < 1 and not new.found:
+            planner, share = wide, 1.0
+            new = now._route(planner, ends, **options)
+        notes = new.notes
+        if share < 1:
+            among = (
+                f"searched among {share:.0%} of the nodes, those on ways of the roadmap's legs at most {NEAR:.0%}"
+            )
+            notes = (*notes, f"{among} longer than their best; --all-nodes searches all, which takes longer")
+        old = located(old, Assembly(before.leaving(-since), frozen=False))
+        flown = flown_on(old, since, place, leaves)
+        current = None
+        if dac is not None:
+            current = compared(np.array(dac), old, since, place, (leaves, before), new, tolerance)
+        good = None if arrived else good_until_of(flown, new, planner, radius, tolerance)
+        return Replan(new, old, since, place, flown, good, current, radius, arrived, leaves, notes)
+
+    def _near_ways(self, planner: RoutePlanner, start: Array, goal: Array) -> tuple[RoutePlanner, float]:
+        """Return the planner among the nodes near the best ways by the legs of a roadmap, and their share.
+
+        It is the same planner, and 1, if its legs are known, or if no roadmap has legs of one departure.
+        """
+        guide = self._guide
+        if type(planner) is not ClockPlanner or guide is None:
+            return planner, 1.0
+        by_legs = guide._once("guide", Planner, lambda: Planner(_one_slice(guide.roadmap), guide.problem))
+        through = by_legs.arrivals(start) + by_legs.remaining(goal)
+        best = float(through.min(initial=np.inf))
+        if not np.isfinite(best):
+            return planner, 1.0
+        near = through <= (1 + NEAR) * best
+        nodes = np.ascontiguousarray(planner.position[near])
+        return ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen), float(near.mean())
+
+    @property
+    def _guide(self) -> "OpenedRoadmap | None":
+        """A roadmap of the same nodes, whose legs are of another time or another forecast; None without one."""
+        kept = self._kept.get("guide of nodes")
+        return kept if isinstance(kept, OpenedRoadmap) else None
+
+    def _at_fix(self, old: Path, time: Moment) -> tuple[Problem, float]:
+        """Return the problem for gliders that leave at a fix, and the time [s] since the departure of an old
+        plan.
+
+        InputError if the plan is not one of this problem, or if the fix is before its departure.
+        """
+        problem = self.problem
+        if old.origin is not None:
+            same = domain_from_table(tomllib.loads(old.origin.scenario).get("domain", {})) == self.scenario.domain
+            require(
+                same, "the plan was made in another [domain], so its places are others; give its own scenario"
+            )
+        began = problem.departure if old.departure is None else old.departure
+        began = began if old.origin is None else old.origin.departure
+        leaving = problem.leaving(began - problem.departure)
+        check_moment(leaving, "the plan's departure", "give the currents that it was planned with")
+        check_plan(old, leaving)
+        since = seconds(time, problem, "fix") - began
+        if since < 0:
+            left = f"{began:,.0f} s" if leaving.departs is None else moment(leaving.departs, 0.0)
+            require(
+                False, f"the fix's time {time} is before the plan's departure, {left}; give the time of the fix"
+            )
+        return leaving.leaving(since), since
+
+    def _radius(self, goal: Array, arrival_radius: float | None) -> float:
+        """Return the distance [m] at which a goal counts as reached: a list's for places that surface, else a
+        leg's."""
+        if arrival_radius is not None:
+            require(
+                0 <= arrival_radius < np.inf, f"the arrival radius must be 0 m or more; got {arrival_radius:g}"
+            )
+            return arrival_radius
+        listed = isinstance(self.scenario.domain, GeographicDomain) and goal[2] >= -SURFACE
+        return float(RADIUS if listed else self.problem.evaluator.integration.tolerance)
+
+    def _renewed(
+        self, currents: str | File | Sequence[str | File], before: Problem, start: Array, goal: Array
+    ) -> "OpenedScenario":
+        """Return the same scenario and nodes in newer currents, for gliders that leave as in `before`."""
+        files = [currents] if isinstance(currents, str | File) else list(currents)
+        ends = {name: shown(place, before) for name, place in (("start", start), ("goal", goal))}
+        query: dict[str, Any] = {**ends, "departure": before.departure}
+        if before.departs is not None:
+            query |= {"departure": 0.0, "epoch": before.departs.replace(tzinfo=None).isoformat()}
+        later = OpenedScenario(with_currents(self.scenario, files, query), self.title)
+        later._kept |= {"position": self.position, "file": self._file, "guide of nodes": self._guide}
+        return later
+
+    def _origin(self, planner: RoutePlanner) -> Origin:
+        """Return what the paths of a planner are planned with."""
+        rule, road = planner.rule, self._file
+        named = "" if road is None else str(road.absolute())
+        what: dict[str, Any] = {"departure": planner.problem.departure, "most_yos": rule.most_yos}
+        nodes_only = self._roadmap is None and bool(named)
+        return Origin(self.scenario.text, named, nodes_only, most_hours=rule.most_hours, **what)
+
+    @property
+    def _file(self) -> File | None:
+        """The file of the roadmap whose nodes are searched; None without one."""
+        kept = self._kept.get("file")
+        return kept if isinstance(kept, File) else None
 
     def _least(self, path: Path, departure: float) -> float:
         """A bound below the cost of every route between a path's ends that leaves at a departure [s]."""
@@ -444,6 +644,14 @@ class OpenedRoadmap(OpenedScenario):
         return self.roadmap
 
     @property
+    def _file(self) -> File | None:
+        return self.roadmap.file
+
+    @property
+    def _guide(self) -> "OpenedRoadmap | None":
+        return self
+
+    @property
     def position(self) -> Array:
         """The nodes (n, 3) [m]."""
         return self.roadmap.position
@@ -498,6 +706,57 @@ def open(
     if isinstance(roadmap, Roadmap | SlicedRoadmap):
         return OpenedRoadmap(roadmap)
     return OpenedRoadmap(read_any_roadmap(roadmap), File(roadmap).stem)
+
+
+def open_plan(path: Path, overrides: Sequence[str] = ()) -> OpenedScenario:
+    """Open what a plan was made with: its roadmap if that is still there, else its scenario.
+
+    `overrides` give the new place of files, such as "flow.file=currents.nc". InputError if the plan does not say
+    what it was made with.
+    """
+    origin = path.origin
+    cure = "name its roadmap with --roadmap, or its scenario with --scenario"
+    require(
+        origin is not None, f"the plan does not say what it was made with: an earlier version wrote it; {cure}"
+    )
+    assert origin is not None
+    road = None
+    if origin.roadmap and File(origin.roadmap).is_file():
+        road = open(origin.roadmap)
+        if not origin.nodes_only:
+            built = settings_sha256(road.roadmap.provenance.scenario)
+            same = built == settings_sha256(origin.scenario)
+            require(same, f"the roadmap {origin.roadmap} has been built anew with other settings; {cure}")
+            return open(origin.roadmap, overrides) if overrides else road
+    elif origin.roadmap:
+        gone = f"the plan's roadmap {origin.roadmap} is not there: the scenario's nodes are taken instead"
+        warnings.warn(f"{gone}; to use the roadmap, name it with --roadmap", InputWarning, stacklevel=2)
+    opened = OpenedScenario(scenario_from_text(origin.scenario, overrides, "the plan's scenario"))
+    if road is not None:
+        opened._kept |= {"position": road.position, "file": road.roadmap.file, "guide of nodes": road}
+    return opened
+
+
+def _one_slice(road: Roadmap | SlicedRoadmap) -> Roadmap:
+    """Return a roadmap of one departure, the first of several."""
+    return road.at(0) if isinstance(road, SlicedRoadmap) else road
+
+
+def _rule_of(path: Path) -> Surfacing | None:
+    """Return the rule of surfacing that a path was planned with; None if that is unknown."""
+    return None if path.origin is None else Surfacing(path.origin.most_yos, path.origin.most_hours)
+
+
+def check_moment(problem: Problem, what: str, cure: str) -> None:
+    """Raise InputError unless a problem leaves within the times of its flow."""
+    extent, when = problem.evaluator.flow.extent, problem.departure
+    ends = f"{extent.t_lo:,.0f} to {extent.t_hi:,.0f} s"
+    at = f"{when:,.0f} s"
+    if problem.departs is not None and np.isfinite([extent.t_lo, extent.t_hi]).all():
+        ends = " to ".join(moment(problem.departs, end - when) for end in (extent.t_lo, extent.t_hi))
+        at = moment(problem.departs, 0.0)
+    within = extent.t_lo <= when <= extent.t_hi
+    require(within, f"{what}, {at}, lies outside the times of the currents, {ends}; {cure}")
 
 
 def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()) -> OpenedScenario:

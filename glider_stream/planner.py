@@ -1,5 +1,6 @@
 """The planner: one call for each command."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from os.path import realpath
 from pathlib import Path as File
@@ -10,11 +11,12 @@ from .base.output import check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
-from .opened import OpenedRoadmap, open_either, open_scenario, split_outputs
+from .opened import OpenedRoadmap, open_either, open_plan, open_scenario, split_outputs
 from .opened import open as open_roadmap
 from .pilot.card import Card
 from .pilot.lint import Linted
 from .pilot.lint import lint as lint_file
+from .pilot.replan import Replan
 from .pilot.score import Score
 from .pilot.slocum_files import MOST_WAYPOINTS
 from .pilot.windows import HOURS
@@ -27,7 +29,7 @@ from .roadmap.slices import SlicedRoadmap
 from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario
 from .search.departures import Moment
-from .search.path import Path
+from .search.path import Path, load_path
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .water.domain import Point
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from .evaluation.suite import Report
     from .mission.campaign import Campaign
     from .mission.settings import Mission
+    from .pilot.currents import DiveCurrents
     from .roadmap.verify import Verification
     from .vehicle.calibration.result import Calibration
     from .water.describe import Description, Place
@@ -270,6 +273,73 @@ def plan(
         surfacing=surfacing,
         window_hours=window_hours,
     )
+
+
+def replan(
+    path: str | File | Path,
+    fix: tuple[float, float],
+    time: Moment,
+    *,
+    source: str | File | Scenario | AnyRoadmap | None = None,
+    overrides: Sequence[str] = (),
+    **options: Any,
+) -> Replan:
+    """Return a new plan from a position fix to the goal of an old plan; see `OpenedRoadmap.replan`.
+
+    `source`: the roadmap or scenario to search; None stands for what the plan says that it was made with.
+    `overrides` of the scenario, or of a roadmap's files. `options`: see `OpenedRoadmap.replan`.
+
+    Examples:
+        >>> path = planner.query("small.h5", outputs=["plan.json"])
+        >>> answer = planner.replan("plan.json", (-60.0, 60.0), 200.0)
+        >>> answer.new.found, answer.good.whole
+        (True, True)
+    """
+    refines = options.get("within") is not None or options.get("seconds") is not None
+    split_outputs(options.get("outputs", ()), refines)  # before the roadmap is read
+    old = path if isinstance(path, Path) else load_path(path)
+    opened = open_plan(old, overrides) if source is None else open_either(source, overrides)
+    return opened.replan(old, fix, time, **options)
+
+
+def currents(
+    dives: str | File,
+    output: str | File | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    declination: float = 0.0,
+    attack: float = 3.0,
+    fix_error: float = 10.0,
+    speed_error: float = 0.05,
+    heading_error: float = 3.0,
+) -> "DiveCurrents":
+    """Return the depth-averaged current of each dive in a CSV file, or in a NetCDF file of a track, with its
+    error.
+
+    The current is the way between two fixes less the way through water, over the time. `columns` gives other
+    names of columns. `declination` [degrees] is added to headings; `attack` [degrees] is the angle of attack of a
+    track. Standard errors: `fix_error` [m], `speed_error` as a share, `heading_error` [degrees]. The result is
+    written to `output`, .csv or .json.
+
+        Examples:
+        >>> dives = "t_start,lon_start,lat_start,t_end,lon_end,lat_end,east,north"
+        >>> dive = "2024-11-20T12:00,18.30,38.10,2024-11-20T15:00,18.35,38.08,3300,-2100"
+        >>> _ = pathlib.Path("fixes.csv").write_text(dives + chr(10) + dive + chr(10))
+        >>> (dive,) = planner.currents("fixes.csv").dives
+        >>> dive.averaged.current.round(3)
+        array([ 0.101, -0.011])
+
+    """
+    from .pilot.currents import check_currents_output, dive_currents
+    from .vehicle.averaged_current import SensorErrors
+
+    if output is not None:
+        check_currents_output(output)
+    errors = SensorErrors(fix=fix_error, speed=speed_error, heading=math.radians(heading_error))
+    found = dive_currents(dives, columns, declination=declination, attack=attack, errors=errors)
+    if output is not None:
+        found.write(output)
+    return found
 
 
 def trade_off(

@@ -335,14 +335,35 @@ def read_table(path: Path, what: str) -> dict[str, Any]:
     return table
 
 
-def scenario_from_text(text: str) -> Scenario:
-    """Return the scenario from the text that a roadmap holds."""
+def scenario_from_text(
+    text: str, overrides: Sequence[str] = (), whose: str = "the roadmap's scenario"
+) -> Scenario:
+    """Return the scenario from the text that a roadmap or a plan holds; `overrides` as in `read_scenario`."""
     try:
         table = tomllib.loads(text)
-        check_depth(table, "the roadmap's scenario")
+        check_depth(table, whose)
+        _override(table, overrides)
         return scenario_from_table(table, Path())
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"the roadmap's scenario is not valid TOML: {error}") from None
+        raise InputError(f"{whose} is not valid TOML: {error}") from None
+
+
+def with_currents(scenario: Scenario, currents: Sequence[str | Path], query: Mapping[str, Any]) -> Scenario:
+    """Return a scenario that reads other current files; `query` replaces keys of its [query].
+
+    If `query` names an `epoch` (ISO 8601), that is the flow's time 0 now. Slices of several departures are
+    dropped, because their times are those of the old files.
+    """
+    table = tomllib.loads(scenario.text)
+    kind = table["flow"].get("kind")
+    require(kind == "netcdf", f'newer currents are for a flow from a file, kind = "netcdf"; this one is {kind!r}')
+    table["flow"]["file"] = [str(Path(file).absolute()) for file in currents]
+    asked = dict(query)
+    if "epoch" in asked:
+        table["flow"]["epoch"] = asked.pop("epoch")
+    table["query"] = {**table.get("query", {}), **asked}
+    table.pop("departures", None)
+    return scenario_from_table(table, Path())
 
 
 def scenario_of(road: Roadmap | SlicedRoadmap) -> Scenario:

@@ -34,8 +34,12 @@ Refinement = Callable[[Path, Callable[[Path], Path] | None], Path]
 """A function that refines a path; its second argument, if given, polishes the routes of each round."""
 
 
-def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing) -> RoutePlanner:
-    """Return the planner for a roadmap, or for the scenario's nodes if `roadmap` is None; its paths keep `rule`.
+def planner_of(
+    problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing, nodes: Array | None = None
+) -> RoutePlanner:
+    """Return the planner for a roadmap, or for `nodes` (n, 3) [m] if `roadmap` is None; its paths keep `rule`.
+
+    Without `nodes` they are the scenario's.
 
     In a flow that changes with time the clock runs, unless the problem is `frozen`. Then the planner uses the
     slices of the roadmap; if the roadmap has no slices, it uses only the nodes.
@@ -45,7 +49,7 @@ def planner_of(problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: 
             return SlicePlanner(problem, SliceSearch(roadmap, problem), rule)
         roadmap = _slice_of(roadmap, problem.departure)
     if roadmap is None:
-        return ClockPlanner(problem, node_positions(problem), rule, problem.frozen)
+        return ClockPlanner(problem, node_positions(problem) if nodes is None else nodes, rule, problem.frozen)
     if not is_steady(problem.evaluator.flow) and not problem.frozen:
         check_unchanged(roadmap, problem)
         return ClockPlanner(problem, roadmap.position, rule)

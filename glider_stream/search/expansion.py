@@ -7,6 +7,7 @@ import numpy as np
 
 from ..base.arrays import Array, Bools, Index
 from ..kernels.edges import EDGE_COLUMNS, STATUS, TIME, Status
+from ..roadmap.pairs import ReachableLegs
 from ..roadmap.problem import Problem
 
 MOST_REMEMBERED = 512
@@ -44,6 +45,11 @@ class Expansion(Protocol):
     @property
     def spent(self) -> bool:
         """Whether no more fans may be asked for; the search then ends early."""
+        ...
+
+    @property
+    def chosen(self) -> Index | slice:
+        """The places of which `fans` reads whether they are wanted; the legs to all others come anyway."""
         ...
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
@@ -84,6 +90,9 @@ class ClockExpansion:
         for n, goal in enumerate(beside):
             self._may_end[self.legs.before(goal), n] = True
         self.cut = False
+        limited = isinstance(self.legs, ReachableLegs) and self.legs.limit > 0
+        goals = [place for places in self.goals for place in places.tolist()]
+        self._chosen: Index | slice = np.unique(np.array(goals, np.int64)) if limited else slice(None)
 
     @property
     def places(self) -> Array:
@@ -114,6 +123,14 @@ class ClockExpansion:
     def spent(self) -> bool:
         """Always False: this expansion has no limit."""
         return False
+
+    @property
+    def chosen(self) -> Index | slice:
+        """The places of which it matters whether they are wanted.
+
+        If a node's legs are limited by number, these are the goals: all other legs are found anyway.
+        """
+        return self._chosen
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
         """Return the connected legs from places `place` (n,) that begin at `time` (n,) [s]; see `Expansion`."""
@@ -185,6 +202,11 @@ class BoundedExpansion:
     def spent(self) -> bool:
         """Whether `most` fans have been found."""
         return self.found >= self.most
+
+    @property
+    def chosen(self) -> Index | slice:
+        """The places of which it matters whether they are wanted."""
+        return self.clock.chosen
 
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
         """Return the legs from places `place` (n,) that begin at `time` (n,) [s], remembered ones if possible."""

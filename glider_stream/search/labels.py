@@ -55,8 +55,8 @@ class Bound(Protocol):
         """The greatest vertical speed of any glide [m/s]."""
         ...
 
-    def between(self, place: int) -> Array:
-        """Return a lower bound of the time (n,) [s] from one place to each place."""
+    def between(self, place: int, others: Index | slice = slice(None)) -> Array:
+        """Return a lower bound of the time (n,) [s] from one place to each of `others` (n,)."""
         ...
 
     def remaining(self, goals: Index, cost: Cost) -> tuple[Array, Array]:
@@ -192,19 +192,27 @@ class LabelSearch:
         return np.stack(np.broadcast_arrays(*columns), axis=-1).astype(np.float64)
 
     def _wanted(self, label: Label) -> Bools:
-        """Return a mask of the places to which a leg from a label may be useful, by lower bounds of the leg."""
-        least = self.bound.between(label.place)
+        """Return a mask of the places to which a leg from a label may be useful, by lower bounds of the leg.
+
+        Only the places that the expansion chooses by it are examined.
+        """
+        wanted = np.zeros(self.height.size, np.bool_)
+        to = self.expansion.chosen
+        up = self.up[to]
+        if not up.size:
+            return wanted
+        least = self.bound.between(label.place, to)
         time, cost = label.time + least, label.cost + self.per_leg + self.per_second * least
-        wanted = (self.height != self.height[label.place]) & (time <= self.aim.latest)
-        wanted &= (cost + self.cost_left if self.by_cost else time + self.left) < self.below
+        some = (self.height[to] != self.height[label.place]) & (time <= self.aim.latest)
+        some &= (cost + self.cost_left[to] if self.by_cost else time + self.left[to]) < self.below
         if self.priced:
-            wanted &= cost + self.cost_left < self.cost_below
+            some &= cost + self.cost_left[to] < self.cost_below
         if self.aim.bins is None:
-            places = np.arange(self.height.size)
-            half, surfaced = np.where(self.up, 0, label.half), np.where(self.up, math.inf, label.surfaced)
-            at_best = self._criteria(places, time, cost, np.zeros(places.size, bool), half, surfaced)
-            wanted &= ~_any_beats(self.best, at_best)
-        return np.asarray(wanted)
+            surfaced, turns = np.where(up, math.inf, label.surfaced), np.zeros(up.size, np.bool_)
+            at_best = self._criteria(0, time, cost, turns, np.where(up, 0, label.half), surfaced)
+            some &= ~_any_beats(self.best[to], at_best)
+        wanted[to] = some
+        return wanted
 
     def _fan(self, number: int) -> Fan:
         """Return the legs of a label; the legs of the labels that follow are found together with them."""

@@ -90,10 +90,10 @@ class LeastTimes:
         self.sink, self.height = speeds.sink, places[:, 2].copy()
         self.potential = speeds.potentials(places)
 
-    def between(self, place: int) -> Array:
-        """Return a lower bound of the time (n,) [s] from one place to each place."""
-        ahead = (self.potential - self.potential[place]).max(axis=1)
-        return np.asarray(np.maximum(ahead, np.abs(self.height - self.height[place]) / self.sink))
+    def between(self, place: int, others: Index | slice = slice(None)) -> Array:
+        """Return a lower bound of the time (n,) [s] from one place to each of `others` (n,)."""
+        ahead = (self.potential[others] - self.potential[place]).max(axis=1)
+        return np.asarray(np.maximum(ahead, np.abs(self.height[others] - self.height[place]) / self.sink))
 
     def remaining(self, goals: Index, cost: Cost) -> tuple[Array, Array]:
         """Return lower bounds (n,) from each place to the nearest goal: time [s], and cost without turns."""

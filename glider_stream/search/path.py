@@ -13,7 +13,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.clock import moment, span
 from ..base.errors import InputError
-from ..base.settings import require
+from ..base.settings import from_table, require
 from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
 
@@ -128,6 +128,30 @@ class Round:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """What a path was planned with, by which it can be planned anew.
+
+    `scenario`: the complete TOML. `roadmap`: the file of the roadmap whose legs were searched, or of which only
+    the nodes were taken if `nodes_only`; empty without one. `departure` [s] of the flow. `most_yos`,
+    `most_hours`: the rule of surfacing, as in a scenario's [query].
+    """
+
+    scenario: str
+    roadmap: str = ""
+    nodes_only: bool = False
+    departure: float = 0.0
+    most_yos: int | None = None
+    most_hours: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the table that is written to the path file."""
+        rule = {"most_yos": self.most_yos, "most_hours": self.most_hours}
+        road = {"roadmap": self.roadmap, "nodes_only": self.nodes_only} if self.roadmap else {}
+        asked = {name: value for name, value in rule.items() if value is not None}
+        return {**road, "departure_s": self.departure, **asked, "scenario": self.scenario}
+
+
+@dataclass(frozen=True)
 class Path:
     """The cheapest path of a query from `start` to `goal` (3,) [m], or the answer that no path was found.
 
@@ -136,6 +160,7 @@ class Path:
     and `why_not` says the same for JSON, if known. `notes` belong to the files that are written from the path.
     `departure` [s] is the flow's time at which the path begins; None in a steady flow. `frozen`: every leg meets
     the current of that time. `expanded` is the share of the nodes at which the search looked for legs, if it did.
+    `origin` is what it was planned with, if that is known.
     `unthinned` are the number of legs and the time [s] before thinning. `unpolished` are the number of legs, the
     time [s] and the cost before polishing. `rounds` are the rounds of refinement. `least` is a lower bound of the
     cost of every route, from the greatest currents.
@@ -165,6 +190,7 @@ class Path:
     departure: float | None = None
     frozen: bool = False
     expanded: float | None = None
+    origin: Origin | None = None
 
     @property
     def clock_runs(self) -> bool:
@@ -215,6 +241,7 @@ class Path:
             **({} if self.found or not self.why else {"why": self.why}),
             **({} if self.why_not is None else {"why_not": dict(self.why_not)}),
             **({"notes": list(self.notes)} if self.notes else {}),
+            **({} if self.origin is None else {"origin": self.origin.as_dict()}),
             "legs": [leg.as_dict() for leg in self.legs],
         }
 
@@ -316,7 +343,17 @@ def load_path(file: str | File) -> Path:
         raise InputError(f"the path file {file} cannot be read: {reason}; write it with `query -o`") from None
     departure = float(_numbers(table, "departure_s", "the path")) if "departure_s" in table else None
     frozen = table.get("frozen") is True
-    return Path(legs[0].start, legs[-1].end, cost, legs, least=least, departure=departure, frozen=frozen)
+    origin = _read_origin(table["origin"], file) if "origin" in table else None
+    known: dict[str, Any] = {"least": least, "departure": departure, "frozen": frozen, "origin": origin}
+    return Path(legs[0].start, legs[-1].end, cost, legs, **known)
+
+
+def _read_origin(table: Any, file: str | File) -> Origin:
+    """Return what a path file says it was planned with; InputError if that is not as `query` writes it."""
+    where = f"`origin` of the path file {file}"
+    require(isinstance(table, dict), f"{where} must be a table; got {table!r}; write it with `query -o`")
+    rest = {"departure" if name == "departure_s" else name: value for name, value in table.items()}
+    return from_table(Origin, rest, where)
 
 
 def _read_leg(leg: Any, where: str) -> Leg:

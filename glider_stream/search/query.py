@@ -127,6 +127,19 @@ class Planner(RoutePlanner):
         nodes = len(self.roadmap.position)
         return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
 
+    def remaining(self, goal: ArrayLike | None = None) -> Array:
+        """Return the least time (n,) [s] from each node to a point; inf if no way leads there."""
+        road, end = self.roadmap, self._goal(goal)
+        nodes = len(road.position)
+        backward = csr_array((road.time, road.target, road.indptr), shape=(nodes, nodes)).T.tocoo()
+        last = end.nodes if end.legs is None else end.legs.nodes
+        times = np.zeros(last.size) if end.legs is None else end.legs.outcomes[:, TIME]
+        # the goal is one more node, from which the search runs backward; a time of 0 would be no edge
+        to = np.concatenate([backward.col, last]), np.concatenate([backward.data, np.maximum(times, 1e-9)])
+        begin = np.concatenate([backward.row, np.full(last.size, nodes)])
+        graph = csr_array((to[1], (begin, to[0])), shape=(nodes + 1, nodes + 1))
+        return np.asarray(dijkstra(graph, directed=True, indices=[nodes])[0, :nodes])
+
     def front(
         self,
         start: ArrayLike | None = None,

@@ -106,6 +106,11 @@ class RoadmapExpansion:
         """Always False: this expansion has no limit."""
         return False
 
+    @property
+    def chosen(self) -> Index | slice:
+        """No place: it does not matter which legs are wanted."""
+        return np.empty(0, np.int64)
+
     def fans(self, place: Index, time: Array, wanted: Bools) -> list[Fan]:
         """Return all legs from places `place` (n,); they do not depend on `time`, and `wanted` is ignored."""
         return [self._fan(int(number)) for number in place]
@@ -152,9 +157,9 @@ class LeftInRoadmap:
         """Keep the expansion; `sink` [m/s] is the greatest vertical speed of any glide."""
         self.expansion, self.sink = expansion, sink
 
-    def between(self, place: int) -> Array:
-        """Return the bound 0 (n,) [s] for all places: a roadmap's legs are known, so none need be left out."""
-        return np.zeros(len(self.expansion.places))
+    def between(self, place: int, others: Index | slice = slice(None)) -> Array:
+        """Return the bound 0 (n,) [s] for `others`: a roadmap's legs are known, so none need be left out."""
+        return np.zeros(len(self.expansion.places[others]))
 
     def remaining(self, goals: Index, cost: Cost) -> tuple[Array, Array]:
         """Return lower bounds from each place to the nearest goal: of time (n,) [s], and of cost (n,).

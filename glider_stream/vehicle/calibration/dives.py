@@ -80,8 +80,8 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
     other phase.
     """
     path = Path(file)
-    header, rows = _table(path)
-    found = _found(path.name, header, columns or {})
+    header, rows = read_table(path)
+    found = find_columns(path.name, header, columns or {}, COLUMNS)
     listed = f"; it has: {', '.join(header)}"
     require("vertical" in found, f"{path.name} has no column of vertical speeds; name it by `vertical`{listed}")
     given = {"horizontal", "pitch", "glide_angle"} & set(found)
@@ -128,8 +128,8 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
     )
 
 
-def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the header and the rows with their line numbers."""
+def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Return the header of a CSV file of dives, and its rows with their line numbers."""
     check_file(path, "the file of dives")
     require(path.is_file(), f"the file of dives {path} does not exist; give a CSV file")
     size = path.stat().st_size
@@ -164,13 +164,18 @@ def _rows(reader: Iterator[list[str]], name: str, width: int) -> Iterator[tuple[
         yield line, row
 
 
-def _found(name: str, header: Sequence[str], columns: Mapping[str, str]) -> dict[str, str]:
-    """Return the column in the file for each entry of COLUMNS that it has."""
+def find_columns(
+    name: str, header: Sequence[str], columns: Mapping[str, str], known: Mapping[str, Sequence[str]]
+) -> dict[str, str]:
+    """Return the column in the file for each value of `known` that it has.
+
+    `columns` names columns that have other names than the usual ones in `known`.
+    """
     for what, column in columns.items():
-        require(what in COLUMNS, f"`{what}` is not known; choose from: {', '.join(COLUMNS)}")
+        require(what in known, f"`{what}` is not known; choose from: {', '.join(known)}")
         require(column in header, f"{name} has no column `{column}`; it has: {', '.join(header)}")
     found = dict(columns)
-    for what, usual in COLUMNS.items():
+    for what, usual in known.items():
         here = [column for column in header if column.lower() in usual and column not in columns.values()]
         if what not in found and here:
             message = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
