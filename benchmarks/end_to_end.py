@@ -34,6 +34,8 @@ ANALYTIC = {
     "gyre, 12.42 h": (GYRE, [COARSE]),
     "wide swing, 900 s": (GYRE, ["flow.period=900.0", "flow.epsilon=0.45", COARSE]),
     "fast, 1,800 s": (GYRE, ["flow.period=1800.0", "flow.amplitude=0.5", COARSE]),
+    "tidal strait": ("tidal-strait", ["sampling.shape=[15,6,4]"]),
+    "moving vortex": ("moving-vortex", ["sampling.shape=[12,8,4]"]),
 }
 
 
@@ -137,6 +139,16 @@ def washington(file: str) -> Scenario:
     ])  # fmt: skip
 
 
+def washington_north(file: str) -> Scenario:
+    """105 km north against the coastal current: the glider is carried south first, and comes back for days."""
+    return read_scenario("ionian", [
+        f"flow.file={file}", "flow.epoch=2024-10-29T00:00:00", "domain.lon=[-125.9,-125.5]",
+        "domain.lat=[46.8,47.9]", "sampling.kind=grid", "sampling.shape=[26,98,2]",
+        "query.start=[-125.6,46.9,0.0]",
+        "query.goal=[-125.6,47.85,0.0]",
+    ])  # fmt: skip
+
+
 def galicia(file: str) -> Scenario:
     """More than a day in a daily analysis."""
     return read_scenario("ionian", [
@@ -162,8 +174,12 @@ def main() -> None:
         if args.only is None or name in args.only:
             found.append(field(name, read_scenario(scenario, sets), args.routes, seed))
             print(found[-1], file=sys.stderr, flush=True)
-    for name, file, make in (("washington", args.washington, washington), ("galicia", args.galicia, galicia)):
-        if file is not None:
+    for name, file, make in (
+        ("washington", args.washington, washington),
+        ("washington, 105 km north", args.washington, washington_north),
+        ("galicia", args.galicia, galicia),
+    ):
+        if file is not None and (args.only is None or name in args.only):
             found.append(file_route(name, make(file)))
             print(found[-1], file=sys.stderr, flush=True)
     text = json.dumps({"command": " ".join(["python", *sys.argv]), "flows": found}, indent=1)

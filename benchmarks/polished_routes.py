@@ -19,6 +19,7 @@ import sys
 import time
 import tomllib
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from experiment import random_vortices
 import glider_stream
 from glider_stream.base.threads import threads
 from glider_stream.base.toml import to_toml
+from glider_stream.evaluation.suite import LAW, references
 from glider_stream.roadmap.builder import build_roadmap
 from glider_stream.roadmap.verify import replayed_misses
 from glider_stream.scenario import read_scenario, scenario_from_text, shipped_scenarios
@@ -57,10 +59,7 @@ def compared(name: str, road: Any, within: float | None) -> dict[str, Any]:
     after = road.query(polish=True)
     took = time.perf_counter() - searched - (searched - begun)
     assert found.travel_time == before.travel_time
-    stops = np.array([after.legs[0].start, *(leg.end for leg in after.legs)])
-    here = np.arange(len(after.legs))
-    rows = [[n.duration, n.cost, n.glide_angle, n.heading, n.speed, n.miss] for n in after.legs]
-    off = replayed_misses(road.problem.evaluator, road.problem.departure, stops, here, here + 1, np.array(rows))
+    off = worst_end(road, after)
     refined: dict[str, Any] = {}
     if within is not None:
         begun = time.perf_counter()
@@ -78,27 +77,61 @@ def compared(name: str, road: Any, within: float | None) -> dict[str, Any]:
         "polished_s": round(after.travel_time, 1),
         "polished_legs": len(after.legs),
         "wall_s": round(took, 2),
-        "worst_end_m": round(float(off.max()), 4),
+        "worst_end_m": round(off, 4),
         **refined,
     }
 
 
-def routes(ionian: Path | None, within: float | None) -> Iterator[dict[str, Any]]:
-    """All routes, the fields' with their references."""
-    references = json.loads((RECORDS / "level_set_fields.json").read_text())["fields"]
+def worst_end(road: Any, path: Any) -> float:
+    """The greatest distance [m] from its stop at which another integrator ends a leg of a path."""
+    stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)])
+    here = np.arange(len(path.legs))
+    rows = np.array([[n.duration, n.cost, n.glide_angle, n.heading, n.speed, n.miss] for n in path.legs])
+    departs = np.array([road.problem.departure + path.clock_runs * leg.depart for leg in path.legs])
+    return float(replayed_misses(road.problem.evaluator, departs, stops, here, here + 1, rows).max())
+
+
+def field_routes(within: float | None) -> Iterator[dict[str, Any]]:
+    """The routes in the random fields, with their references."""
+    finest_times = json.loads((RECORDS / "level_set_fields.json").read_text())["fields"]
     for seed in range(SEEDS):
         scenario = scenario_from_text(scenario_text(seed))
-        road = glider_stream.open(build_roadmap(scenario.problem(), None, lambda progress: None))
+        road = glider_stream.open(build_roadmap(scenario.problem()))
         row = compared(f"field {seed}", road, within)
-        finest = references[str(seed)]["finest_s"]
-        names = ("found", "polished", "refined") if within is not None else ("found", "polished")
-        over = {name: round(100 * (row[f"{name}_s"] / finest - 1), 2) for name in names}
-        yield row | {"level_set_s": finest, "over_percent": over}
-    if ionian is not None:
-        scenario = read_scenario("ionian", [f"flow.file={ionian}"])
-        yield compared(
-            "ionian", glider_stream.open(build_roadmap(scenario.problem(), None, lambda progress: None)), within
-        )
+        known = finest_times[str(seed)]
+        finest, arrives = known["finest_s"], known["path_that_arrives_s"]
+        yield row | {
+            "level_set_s": finest,
+            "over_percent": over_percent(row, finest),
+            "path_that_arrives_s": arrives,
+            "over_the_path_percent": over_percent(row, arrives),
+        }
+
+
+def ionian_routes(currents: Path | None, within: float | None) -> Iterator[dict[str, Any]]:
+    """The route of the shipped Ionian scenario, if there is a file of currents."""
+    if currents is not None:
+        scenario = read_scenario("ionian", [f"flow.file={currents}"])
+        yield compared("ionian", glider_stream.open(build_roadmap(scenario.problem())), within)
+
+
+def suite_routes(within: float | None) -> Iterator[dict[str, Any]]:
+    """The suite's problems that have a route, with their references, and whether a route is below the bound."""
+    for name, reference in references().items():
+        if reference.seconds is None or reference.bound is None:
+            continue
+        scenario = read_scenario(name, [LAW, "steering.method=flow-map"])
+        row = compared(name, glider_stream.open(build_roadmap(scenario.problem())), within)
+        over = over_percent(row, reference.seconds)
+        below = min(row[f"{name}_s"] for name in over) < reference.bound - 0.05
+        known = {"reference_s": reference.seconds, "bound_s": reference.bound}
+        yield row | known | {"over_percent": over, "below_the_bound": below}
+
+
+def over_percent(row: dict[str, Any], reference: float) -> dict[str, float]:
+    """By how much the routes of a row take longer than a reference [s]."""
+    names = [name for name in ("found", "polished", "refined") if f"{name}_s" in row]
+    return {name: round(100 * (row[f"{name}_s"] / reference - 1), 2) for name in names}
 
 
 def main() -> None:
@@ -107,6 +140,7 @@ def main() -> None:
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the fields' scenarios instead")
     parser.add_argument("--ionian", type=Path, metavar="CURRENTS.nc", help="the shipped Ionian scenario, too")
     parser.add_argument("--within", type=float, metavar="SHARE", help="refine too, until a round gains less")
+    parser.add_argument("--only", choices=("fields", "suite"), help="these routes alone")
     parser.add_argument("-o", "--output", type=Path, help="a JSON file to keep the result in")
     args = parser.parse_args()
     if args.write:
@@ -116,7 +150,9 @@ def main() -> None:
         return
     rows = []
     with threads(None) as count:
-        for row in routes(args.ionian, args.within):
+        fields = field_routes(args.within) if args.only != "suite" else ()
+        suite = suite_routes(args.within) if args.only != "fields" else ()
+        for row in chain(fields, suite, ionian_routes(args.ionian, args.within)):
             rows.append(row)
             print(row, file=sys.stderr, flush=True)
     machine = f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"

@@ -47,6 +47,15 @@ def key_and_value(text: str) -> tuple[str, Any]:
     return key, float(value) if re.fullmatch(r"\d+\.\d+", value) else value
 
 
+def scale_and_value(text: str) -> tuple[str, float]:
+    """Return the name of a scale and its value."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    try:
+        return name, float(value)
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not NAME=NUMBER, such as length=20000") from None
+
+
 def fix_place(text: str) -> tuple[float, float, str]:
     """Return two numbers and a time with commas between them."""
     parts = text.split(",")
@@ -102,6 +111,16 @@ ELSEWHERE = click.option(
     multiple=True,
     metavar="SECTION.KEY=FILE",
     help="The new place of a file of ROADMAP's scenario, such as flow.file=currents.nc.",
+)
+
+
+NAME = click.option(
+    "--name",
+    "names",
+    multiple=True,
+    type=key_and_value,
+    metavar="KEY=VALUE",
+    help="A setting for what the files do not hold, as in [flow.names]: u, v, lon, lat, depth, time, units, ...",
 )
 
 
@@ -567,14 +586,7 @@ def plot(
     metavar="LON,LAT,DEPTH[,TIME]",
     help="Show the current at this place.",
 )
-@click.option(
-    "--name",
-    "names",
-    multiple=True,
-    type=key_and_value,
-    metavar="KEY=VALUE",
-    help="A setting for what the files do not hold, as in [flow.names]: u, v, lon, lat, depth, time, units, ...",
-)
+@NAME
 @JSON
 def describe(
     currents: tuple[Path, ...], at: tuple[Any, ...], names: tuple[tuple[str, Any], ...], as_json: bool
@@ -673,6 +685,94 @@ def bound(
         _write_json(found.as_dict())
     else:
         say(found)
+
+
+MAP_OPTIONS = (
+    click.option(
+        "--dives", multiple=True, type=FILE, help="Currents averaged over dives: CSV, or a glider's NetCDF."
+    ),
+    click.option("--points", multiple=True, type=FILE, help="Currents at points: CSV with lon, lat, u, v."),
+    click.option(
+        "--drifters", multiple=True, type=FILE, help="Fixes of drifters: CSV with drifter, time, lon, lat."
+    ),
+    click.option(
+        "--column", "columns", multiple=True, type=key_and_value, metavar="WHAT=COLUMN", help="A column's name."
+    ),
+    click.option(
+        "--scale",
+        "scales",
+        multiple=True,
+        type=scale_and_value,
+        metavar="NAME=VALUE",
+        help="A known scale: speed, noise, mean [m/s], length, depth [m], time [s]; the others are fitted.",
+    ),
+    click.option(
+        "--kernel", default="matern", show_default=True, help="matern for rough currents, gaussian for smooth."
+    ),
+    click.option(
+        "--inducing", type=int, metavar="N", help="With very many measurements: let N of them stand for all."
+    ),
+    click.option("--members", type=int, default=0, metavar="N", help="Write N currents that may be, beside."),
+    click.option("--seed", type=int, default=0, show_default=True, help="For members and for starts of the fit."),
+    click.option("-o", "--output", required=True, type=FILE, help="The NetCDF file to write."),
+    JSON,
+)
+
+
+def map_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of commands that map currents."""
+    for option in reversed(MAP_OPTIONS):
+        command = option(command)
+    return command
+
+
+def _mapped(make: Callable[..., Any], *places: Any, output: Path, as_json: bool, **options: Any) -> None:
+    """Make a map and print its figures."""
+    from . import planner
+
+    for pairs in ("columns", "scales"):
+        options[pairs] = dict(options[pairs])
+    options["columns"] = {what: str(column) for what, column in options["columns"].items()}
+    found = make(*places, output, **options)
+    if as_json:
+        _write_json(found.as_dict())
+        return
+    files = [output, planner.members_file(output)] if options["members"] else [output]
+    say("\n".join([str(found), *(f"  file: {file}" for file in files)]))
+
+
+@cli.command()
+@click.argument("forecast", nargs=-1, required=True, type=FILE)
+@NAME
+@map_options
+def assimilate(forecast: tuple[Path, ...], names: tuple[tuple[str, Any], ...], **options: Any) -> None:
+    """Correct the currents of FORECAST by measurements.
+
+    The output holds the corrected current and its standard deviation on the same grid, levels and times, and is a
+    current file as any other.
+    """
+    from . import planner
+
+    _mapped(planner.assimilate, forecast, names=dict(names), **options)
+
+
+@cli.command("map")
+@click.option("--lon", nargs=2, type=float, required=True, metavar="WEST EAST", help="Degrees.")
+@click.option("--lat", nargs=2, type=float, required=True, metavar="SOUTH NORTH", help="Degrees.")
+@click.option("--spacing", type=float, required=True, metavar="METRES", help="The widest spacing of the grid.")
+@click.option("--depth", multiple=True, type=float, metavar="METRES", help="A level; 0 if not given; repeatable.")
+@click.option("--time", "times", multiple=True, metavar="T", help="A date (UTC) of the map; repeatable.")
+@map_options
+def map_command(
+    lon: tuple[float, float], lat: tuple[float, float], spacing: float, depth: tuple[float, ...], **options: Any
+) -> None:
+    """Map currents from measurements alone.
+
+    The output holds the current and its standard deviation, and is a current file as any other.
+    """
+    from . import planner
+
+    _mapped(planner.map_currents, lon, lat, spacing, depth=depth or (0.0,), **options)
 
 
 @cli.command()

@@ -413,7 +413,9 @@ class OpenedScenario:
     def table(self, starts: Sequence[Point], goals: Sequence[Point], *, depart: Moment | None = None) -> Array:
         """Return the costs of the cheapest paths from n points to m others: (n, m), inf where no path exists.
 
-        They leave at `depart`, as in `query`.
+        They leave at `depart`, as in `query`. In a flow that changes, only the earliest way to each node is
+        followed to several goals, without a second look for later ways: a cost may be above that of `query`. If
+        `query.frozen` is set, all legs meet the current of the departure, and these times do not hold.
 
         Examples:
             >>> road.table([(-190, 190, 0)], [(100, -100, -75), (0, 0, -150)]).round()
@@ -425,7 +427,9 @@ class OpenedScenario:
     def arrivals(self, start: Point | None = None, *, depart: Moment | None = None) -> Array:
         """Return the earliest time [s from departure] at which each node (n,) can be reached; inf if it cannot.
 
-        Gliders leave at `depart`, as in `query`.
+        Gliders leave at `depart`, as in `query`. In a flow that changes, only the earliest way to each node is
+        followed: who comes later to a node on the way may in rare cases arrive earlier. If `query.frozen` is set,
+        all legs meet the current of the departure, and these times do not hold.
 
         Examples:
             >>> int((road.arrivals() < 300).sum())

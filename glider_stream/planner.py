@@ -7,6 +7,7 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 from .base.arrays import Array
+from .base.checks import Range
 from .base.output import check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
     from .roadmap.verify import Verification
     from .vehicle.calibration.result import Calibration
     from .water.describe import Description, Place
+    from .water.mapping.assimilate import Corrected
+    from .water.mapping.measured import Measurements
     from .water.ocean import Names
 
 AnyRoadmap = str | File | Roadmap | SlicedRoadmap | OpenedRoadmap
@@ -561,6 +564,136 @@ def describe(
     from .water.describe import describe
 
     return describe(currents, at, names)
+
+
+def assimilate(
+    forecast: str | File | Sequence[str | File],
+    output: str | File | None = None,
+    *,
+    dives: Sequence[str | File] = (),
+    points: Sequence[str | File] = (),
+    drifters: Sequence[str | File] = (),
+    names: "Names | Mapping[str, Any] | None" = None,
+    columns: Mapping[str, str] | None = None,
+    scales: Mapping[str, float] | None = None,
+    kernel: str = "matern",
+    inducing: int | None = None,
+    members: int = 0,
+    seed: int = 0,
+) -> "Corrected":
+    """Return a forecast of currents corrected by what vehicles measured, and write it to `output` as NetCDF.
+
+    `dives`, `points`, `drifters`: files; `columns` names columns of CSV files that have other names. `scales` of
+    the forecast's error that are known; the others are fitted. `members`: so many currents that may be; they are
+    written to a second file, whose name ends in -members.nc. `inducing`: so many measurements stand for all, if
+    there are very many.
+
+    Examples:
+        >>> header = "start,lon,lat,max_depth,dac_east,dac_north"
+        >>> rows = ["2024-11-20T12:00,18.4,38.0,500,0.14,-0.05", "2024-11-20T12:00,18.5,37.95,500,0.13,-0.06"]
+        >>> _ = pathlib.Path("measured.csv").write_text("\\n".join([header, *rows]))
+        >>> better = planner.assimilate("currents.nc", "better.nc", dives=["measured.csv"])
+        >>> better.after < better.before
+        True
+    """
+    from .water.mapping.assimilate import assimilate
+    from .water.ocean import read_currents
+
+    _check_map(output, members)
+    measured = _measurements(dives, points, drifters, columns)
+    some = [forecast] if isinstance(forecast, (str, File)) else list(forecast)
+    found = assimilate(read_currents(some, names), measured, scales, kernel=kernel, inducing=inducing, seed=seed)
+    _write_map(found, output, members, seed)
+    return found
+
+
+def map_currents(
+    lon: Range,
+    lat: Range,
+    spacing: float,
+    output: str | File | None = None,
+    *,
+    dives: Sequence[str | File] = (),
+    points: Sequence[str | File] = (),
+    drifters: Sequence[str | File] = (),
+    depth: Sequence[float] = (0.0,),
+    times: Sequence[str] = (),
+    columns: Mapping[str, str] | None = None,
+    scales: Mapping[str, float] | None = None,
+    kernel: str = "matern",
+    inducing: int | None = None,
+    members: int = 0,
+    seed: int = 0,
+) -> "Corrected":
+    """Return a map of currents from measurements alone, every `spacing` [m] over `lon`, `lat` [degrees].
+
+    At depths [m] and `times` (ISO 8601, UTC); see `assimilate` for the rest.
+
+    Examples:
+        >>> rows = ["lon,lat,u,v", "18.1,38.0,0.1,0.0", "18.2,38.1,0.2,0.1", "18.3,38.0,0.1,0.1"]
+        >>> _ = pathlib.Path("points.csv").write_text("\\n".join(rows))
+        >>> found = planner.map_currents((18.0, 18.4), (37.9, 38.2), 4000, "map.nc", points=["points.csv"])
+        >>> found.file.u.shape
+        (1, 1, 10, 10)
+    """
+    from .water.mapping.mapped import map_currents
+
+    _check_map(output, members)
+    measured = _measurements(dives, points, drifters, columns)
+    more: dict[str, Any] = {"kernel": kernel, "inducing": inducing, "seed": seed}
+    found = map_currents(measured, lon, lat, spacing, depth, times, scales, **more)
+    _write_map(found, output, members, seed)
+    return found
+
+
+def _check_map(output: str | File | None, members: int) -> None:
+    require(members >= 0, f"`members` must be 0 or more; got {members}")
+    require(members == 0 or output is not None, "`members` need an output file; name one")
+    if output is not None:
+        check_output(output)
+
+
+def _measurements(
+    dives: Sequence[str | File],
+    points: Sequence[str | File],
+    drifters: Sequence[str | File],
+    columns: Mapping[str, str] | None,
+) -> "list[Measurements]":
+    """Return the measurements in some files."""
+    from .water.mapping.dive_files import read_dives, read_drifters, read_points
+
+    kinds = sum(map(bool, (dives, points, drifters)))
+    require(kinds > 0, "there are no measurements; give files of dives, points or drifters")
+    require(
+        kinds == 1 or not columns,
+        "columns can be named for one kind of file only; rename those of the others, or leave these files out",
+    )
+    found: list[Measurements] = [read_dives(dives, columns)] if dives else []
+    found += [read_points(file, columns) for file in points]
+    return found + [read_drifters(file, columns) for file in drifters]
+
+
+def _write_map(found: "Corrected", output: str | File | None, members: int, seed: int) -> None:
+    """Write a corrected current with its standard deviation, and its members beside."""
+    if output is None:
+        return
+    from .water.ocean.writing import write_currents
+
+    title, comment = found.file.name, f"{found.fit.scales}; {'; '.join(found.notes)}".rstrip("; ")
+    write_currents(found.file, output, deviation=found.deviation(), title=title, comment=comment)
+    if members:
+        drawn = [(member.u, member.v) for member in found.members(members, seed)]
+        write_currents(found.file, members_file(output), members=drawn, title=title, comment=comment)
+
+
+def members_file(output: str | File) -> File:
+    """Return the name of the file of members beside an output.
+
+    Examples:
+        >>> planner.members_file("better.nc").name
+        'better-members.nc'
+    """
+    return File(output).with_name(f"{File(output).stem}-members.nc")
 
 
 def calibrate(

@@ -91,6 +91,31 @@ class Jet(NamedTuple):
     extent: Extent
 
 
+class MovingVortices(NamedTuple):
+    """Vortices whose centres move evenly; arrays of shape (n,). `x`, `y` [m] are the places at t = 0."""
+
+    x: Array
+    y: Array
+    radius: Array
+    speed: Array
+    depth: Array
+    thickness: Array
+    drift_x: Array
+    drift_y: Array
+    extent: Extent
+
+
+class TidalJet(NamedTuple):
+    """A jet along x that turns with the tide: `speed` [m/s] in the middle at time `peak` [s]."""
+
+    y: float
+    width: float
+    speed: float
+    period: float
+    peak: float
+    extent: Extent
+
+
 class Grid(NamedTuple):
     """A steady field on a regular grid, trilinear: values (levels, nx, ny, 2) [m/s], z upward.
 
@@ -130,7 +155,7 @@ class OceanGrid(NamedTuple):
     extent: Extent
 
 
-Flow = Uniform | Vortices | Gyre | Rankine | Jet | Grid | OceanGrid
+Flow = Uniform | Vortices | MovingVortices | Gyre | Rankine | Jet | TidalJet | Grid | OceanGrid
 
 
 def _uniform(flow, x, y, z, t):
@@ -146,6 +171,20 @@ def _vortices(flow, x, y, z, t):
         radius = flow.radius[n]
         dz = (-z - flow.depth[n]) / flow.thickness[n]
         # psi = s R sqrt(e) exp(-r^2 / 2R^2) exp(-dz^2);  u = d psi/dy, v = -d psi/dx
+        spin = flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
+        u -= spin * dy
+        v += spin * dx
+    return u, v
+
+
+def _moving_vortices(flow, x, y, z, t):
+    u = 0.0
+    v = 0.0
+    for n in range(flow.x.size):
+        dx = x - flow.x[n] - t * flow.drift_x[n]
+        dy = y - flow.y[n] - t * flow.drift_y[n]
+        radius = flow.radius[n]
+        dz = (-z - flow.depth[n]) / flow.thickness[n]
         spin = flow.speed[n] / radius * math.exp(0.5 - 0.5 * (dx * dx + dy * dy) / (radius * radius) - dz * dz)
         u -= spin * dy
         v += spin * dx
@@ -173,6 +212,12 @@ def _rankine(flow, x, y, z, t):
 def _jet(flow, x, y, z, t):
     inside = abs(y - flow.y) <= 0.5 * flow.width
     return flow.speed if inside else 0.0, 0.0
+
+
+def _tidal_jet(flow, x, y, z, t):
+    # u = s cos(2 pi (t - peak) / T) exp(-(2 (y - y_0) / width)^2)
+    off = 2.0 * (y - flow.y) / flow.width
+    return flow.speed * math.cos(2.0 * math.pi * (t - flow.peak) / flow.period) * math.exp(-off * off), 0.0
 
 
 @inlined
@@ -260,6 +305,27 @@ def _grid_carry(flow, z):
     return flow.level_carry[k] + (c * (low + 0.5 * c * (high - low)) + beyond * speed) / flow.per_z
 
 
+def _no_cycle(flow):
+    return 0.0
+
+
+def _no_return(flow):
+    return math.inf
+
+
+def _gyre_cycle(flow):
+    return flow.period if flow.epsilon != 0.0 else 0.0
+
+
+def _tidal_cycle(flow):
+    return flow.period
+
+
+def _ocean_cycle(flow):
+    # a file of one time has no first and last time
+    return 0.0 if math.isinf(flow.extent.t_lo) else math.inf
+
+
 class Abilities(NamedTuple):
     """The functions of one class of flow; they have the names of the public functions."""
 
@@ -267,16 +333,19 @@ class Abilities(NamedTuple):
     contains: Callable[..., Any] = _in_box
     contains_box: Callable[..., Any] = _box_in_box
     carry: Callable[..., Any] = _steady_carry
+    cycle: Callable[..., float] = _no_cycle
 
 
 ABILITIES: dict[type, Abilities] = {
     Uniform: Abilities(_uniform),
     Vortices: Abilities(_vortices),
-    Gyre: Abilities(_gyre),
+    MovingVortices: Abilities(_moving_vortices, cycle=_no_return),
+    Gyre: Abilities(_gyre, cycle=_gyre_cycle),
     Rankine: Abilities(_rankine),
     Jet: Abilities(_jet),
+    TidalJet: Abilities(_tidal_jet, cycle=_tidal_cycle),
     Grid: Abilities(_grid, carry=_grid_carry),
-    OceanGrid: Abilities(_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure),
+    OceanGrid: Abilities(_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle),
 }
 
 
@@ -308,6 +377,14 @@ def carry(flow: Flow, z: float) -> float:
 
 for _ability in (velocity, contains, contains_box, carry):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
+
+
+def cycle(flow: Flow) -> float:
+    """Return after which time [s] the flow is the same again: 0 if it is steady, inf if it never is.
+
+    Only Python code asks this.
+    """
+    return ABILITIES[type(flow)].cycle(flow)
 
 
 def fields_of(flow: tuple[Any, ...]) -> dict[str, Any]:

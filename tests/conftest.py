@@ -14,7 +14,7 @@ from glider_stream.roadmap.steering import IntegrationSettings, StreamlineMethod
 from glider_stream.scenario import read_scenario
 from glider_stream.vehicle.polar import polar
 from glider_stream.vehicle.presets import PRESETS
-from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, Uniform, Vortex, Vortices
+from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, TidalJet, Uniform, Vortex, Vortices
 from glider_stream.water.sampled import sample_flow
 
 MANY_TESTS = 1000
@@ -40,6 +40,9 @@ FIVE = (
     (-180.0, -140.0, 80.0, -0.6, 10.0, 90.0),
     (220.0, 20.0, 100.0, 0.5, 80.0, 300.0),
 )
+
+
+DRIFT = (0.05, -0.03)
 
 
 @pytest.fixture(scope="session")
@@ -129,6 +132,8 @@ def flows(vortices, sampled, gyre, ocean_of):
         "gyre": gyre,
         "rankine": Rankine(10.0, -20.0, 90.0, -0.6).kernel(HEIGHTS),
         "jet": Jet(30.0, 120.0, 0.8).kernel(HEIGHTS),
+        "tidal": TidalJet(30.0, 120.0, 0.8, 900.0, 250.0).kernel(HEIGHTS),
+        "moving": Vortices(tuple(Vortex(*row, drift=DRIFT) for row in FIVE[:3])).kernel(HEIGHTS),
         "grid": sampled,
         "ocean": ocean_of(lambda i, j, z, t: (0.1 * np.sin(i + j + t / 400), 0.1 * np.cos(i - j + z / 100))),
     }

@@ -55,6 +55,7 @@ def road(place):
         "score road.h5 pipe.csv",
         "lint pipe.ma",
         "calibrate pipe.csv",
+        "assimilate pipe.nc --dives pipe.csv -o x.nc",
         "bench --quick --against pipe.json",
     ],
 )

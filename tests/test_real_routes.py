@@ -24,8 +24,8 @@ gpxpy, kml, shapely, pyproj = (
 )
 GEOD = pyproj.Geod(ellps="WGS84")
 FORMS = ("route.json", "route.geojson", "route.kml", "route.gpx", "route.csv", "targets", "goto_l20.ma")
-# with the clock running the strong coastal current carries the glider south and back: it can get there after 80
-# hours, but comes back to most nodes on the way, and to follow all that takes many minutes
+# with the clock running the strong coastal current carries the glider south and back: it gets there after 86
+# hours, by a search of two minutes (benchmarks/end_to_end.py)
 ROUTES = {
     "ionian": [
         f"flow.file={IONIAN}", "domain.lon=[17.9,18.8]", "domain.lat=[37.3,38.3]",

@@ -7,10 +7,10 @@ Runge-Kutta 3). In three dimensions glide angles lie on the polar or between two
 routes of equal yos, the glider moves at its best horizontal speed in the mean current of the depths of a yo: that
 is what yos meet from one surfacing to the next, and an estimate, since a current varies along a yo.
 
-- Start. V(., 0) is the time tau [s] that a glider in still water needs from the start, as sqrt(tau^2 + SOFT^2) -
-  SOFT with SOFT = TAU: it moves alike, and has no tip. V(goal, t) tells the tau for which a glider that began
-  within tau of the start first reaches the goal at t. A glider from the start itself needs tau / (1 + m / Vh) or
-  more to get out of there, m being the greatest current there, and t from then on: t + tau / (1 + m / Vh).
+- Start. The front does not begin at a point, which no grid shows, but at the set that a glider needs tau [s] to
+  cross in still water. V is that time, as sqrt(tau^2 + SOFT^2) - SOFT with SOFT = tau: it moves alike, and has no
+  tip. Near the start the current is c, and off by m [m/s] at the most. So after s = tau / (1 + m / Vh) a glider
+  from the start is still within tau of the place to which c alone has carried it. There the front begins, at s.
 - Surface and floor. The field goes on beyond both as its mirror image: a path there, folded back, dives where it
   climbed. Gliders may so hold their depth there.
 - Sides. Nothing comes in through the sides of the box. Land is not entered.
@@ -38,6 +38,8 @@ from ..water.inspect import is_steady
 
 CELLS = 4.0
 """The front begins at a set of so many cells of the finer grid around the start."""
+NEAR, PARTS = 1.25, 5
+"""The current near the start is read within NEAR times tau of a glider that drifts, at PARTS times."""
 COURANT = 0.6
 SLOPES = 512
 HEIGHTS = 25
@@ -47,6 +49,7 @@ LONG = 10.0
 NODES = {2: 101, 3: 61}
 """Nodes along the longest side of the finer grid."""
 FEWEST = 21
+STILL = "FROZEN: the front meets the current of the departure, so this holds for no route with the clock running"
 LATEST = 3.0
 """The search ends at so many times of the straight way in still water."""
 
@@ -55,13 +58,15 @@ LATEST = 3.0
 class Bound:
     """The least `time` [s] from start to goal on the finer grid, its `error` [s] the difference to the coarser.
 
-    `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each; `wall_s` is not part of the answer.
+    `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each. `frozen`: the front moves in the current of
+    the departure, though the flow changes.
     """
 
     time: float
     error: float
     dimensions: int
     spacing: tuple[float, ...]
+    frozen: bool = False
 
     @property
     def least(self) -> float:
@@ -77,6 +82,7 @@ class Bound:
             "dimensions": self.dimensions,
             "spacing_m": list(self.spacing),
             "kind": "estimate" if self.dimensions == 2 else "bound",
+            **({"frozen": True} if self.frozen else {}),
         }
 
     def __str__(self) -> str:
@@ -85,6 +91,7 @@ class Bound:
         return (
             f"no route takes less than {span(self.least)}: a level set {where}, arrives after "
             f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s"
+            + (f"; {STILL}" if self.frozen else "")
         )
 
 
@@ -184,7 +191,7 @@ class Front:
     """One run on one grid, from the start, or in a steady flow from the end in the weaker current."""
 
     def __init__(self, waters: Waters, nodes: int, tau: float) -> None:
-        """With so many nodes along the longest side; the front begins within `tau` [s]."""
+        """With so many nodes along the longest side; the front begins as the set within `tau` [s]."""
         self.waters, self.tau = waters, tau
         span_of = waters.hi - waters.lo
         self.shape = tuple(max(9, 1 + round(float(side / span_of.max()) * (nodes - 1))) for side in span_of)
@@ -194,24 +201,38 @@ class Front:
         self.step = np.array([axis[1] - axis[0] for axis in self.axes])
         grid = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
         self.nodes = grid.reshape(-1, len(self.shape))
-        slower = [self._quickening(end) for end in waters.ends]
-        self.backward = waters.steady and slower[1] < slower[0]
-        self.source, self.far = waters.ends[::-1] if self.backward else waters.ends
-        self.quickening = min(slower) if waters.steady else slower[0]
+        leaves = [self._leaves(end, sign) for end, sign in zip(waters.ends, (1.0, -1.0), strict=True)]
+        self.backward = waters.steady and leaves[1][0] > leaves[0][0]
+        self.far = waters.ends[0 if self.backward else 1]
+        self.began, self.source = leaves[1 if self.backward else 0]
         self.water = ~waters.land(self.nodes).reshape(self.shape)
 
-    def _quickening(self, end: Array) -> float:
-        """1 + m / Vh, m the greatest current within tau of an end."""
-        near = self.waters.still_water_time(self.nodes - end) <= 1.5 * self.tau
-        points = np.vstack([self.nodes[near], end])
-        return 1.0 + float(np.hypot(*self.waters.current(points, 0.0).T).max()) / self.waters.fastest
+    def _leaves(self, end: Array, sign: float) -> tuple[float, Array]:
+        """Return when the front begins [s], and the place to which the current has carried `end` by then.
+
+        `sign` is -1 where the front moves against the current, from the goal.
+        """
+        waters, across = self.waters, np.zeros(end.size)
+        across[:2] = waters.current(end[None], 0.0)[0]
+        seen = []
+        for share in np.linspace(0.0, 1.0, PARTS):
+            away = self.nodes - end - sign * share * self.tau * across
+            near = self.nodes[waters.still_water_time(away) <= NEAR * self.tau]
+            seen.append(waters.current(np.vstack([near, end]), share * self.tau))
+        known = np.vstack(seen)
+        carried = 0.5 * (known.min(axis=0) + known.max(axis=0))
+        off = float(np.hypot(*(known - carried).T).max())
+        began = self.tau / (1.0 + off / waters.fastest)
+        place = end.copy()
+        place[:2] += sign * began * carried
+        return began, place
 
     def arrival(self) -> float:
         """When the far end is reached [s], as the module says; inf where that is never."""
         waters, tau = self.waters, self.waters.still_water_time(self.nodes - self.source).reshape(self.shape)
-        values, now = np.hypot(tau, self.tau) - self.tau, 0.0
-        latest = LATEST * float(waters.still_water_time((self.far - self.source)[None])[0])
-        current = self._current(0.0)
+        values, now = np.hypot(tau, self.tau) - self.tau, self.began
+        latest = LATEST * float(waters.still_water_time((waters.ends[1] - waters.ends[0])[None])[0])
+        current = self._current(now)
         most = [waters.fastest, waters.fastest, waters.steepest][: len(self.shape)]
         left = math.inf
         while now < latest:
@@ -224,7 +245,7 @@ class Front:
             now, before, left = now + ahead, left, self._left(values)
             if left <= self.tau:
                 touched = now - ahead * (self.tau - left) / max(before - left, 1e-12)
-                return float(touched + self.tau / self.quickening)
+                return float(touched)
         return math.inf
 
     def _current(self, since: float) -> list[Array]:
@@ -265,10 +286,11 @@ class Front:
 def _one_sided(values: Array, axis: int, step: float, mirror: bool) -> tuple[Array, Array]:
     """Slopes from the left and from the right, by WENO5 (Jiang and Peng 2000)."""
     along = np.moveaxis(values, axis, -1)
-    width = [(0, 0)] * (along.ndim - 1) + [(3, 3)]
-    padded = np.pad(along, width, mode="reflect") if mirror else np.pad(
-        along, width, mode="reflect", reflect_type="odd"
-    )  # fmt: skip
+    before, after = along[..., 3:0:-1], along[..., -2:-5:-1]
+    if not mirror:  # higher beyond the side than on it, so that no front comes in
+        before = along[..., :1] + np.abs(along[..., :1] - before)
+        after = along[..., -1:] + np.abs(along[..., -1:] - after)
+    padded = np.concatenate([before, along, after], axis=-1)
     rises = np.diff(padded, axis=-1) / step
     count = along.shape[-1]
     part = [rises[..., n : n + count] for n in range(6)]
@@ -322,4 +344,5 @@ def bound(
     cure = "take a wider domain, or more nodes"
     require(math.isfinite(found[-1]), f"no front reaches the goal in {LATEST:g} times the straight way; {cure}")
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]
-    return Bound(found[1], error, size, tuple(float(step) for step in front.step))
+    still = problem.frozen and not is_steady(waters.flow)
+    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still)

@@ -48,6 +48,7 @@ class DiveCurrent:
             "lon": (dive.start[0] + turn / 2 + 180) % 360 - 180,
             "lat": (dive.start[1] + dive.end[1]) / 2,
             "hours": (dive.ended - dive.began) / 3600,
+            **({} if dive.max_depth is None else {"max_depth_m": dive.max_depth}),
             "east_mps": float(east),
             "north_mps": float(north),
             "error_east_mps": float(error_east),

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
+from ..base.table import find_columns, read_table
 from ..vehicle.averaged_current import dead_reckoned, horizontal_speed
-from ..vehicle.calibration.dives import find_columns, read_table
+from ..vehicle.calibration.dives import MOST_DIVES
 from ..water.frame import LocalFrame
 from ..water.ocean.opening import opened
 
@@ -30,6 +31,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "north": ("north", "north_m", "through_water_north_m"),
     "heading": ("heading", "heading_deg", "mean_heading", "mean_heading_deg"),
     "horizontal": ("horizontal", "horizontal_speed", "horizontal_speed_mps", "mean_horz_speed_mps", "horz_speed"),
+    "max_depth": ("max_depth", "max_depth_m", "bottom"),
     "surface": ("surface", "surface_s"),
     "drift_east": ("drift_east", "surf_east_mps", "surface_east_mps"),
     "drift_north": ("drift_north", "surf_north_mps", "surface_north_mps"),
@@ -57,7 +59,7 @@ class DiveRecord:
     `start`, `end` (lon, lat) [degrees] at the times `began`, `ended` [s since 1970, UTC]; `over_ground` and
     `through_water` (2,) [m] east and north; `surface` [s] of that time at the surface, with the current `drift`
     (2,) [m/s] there, or None if that is unknown; `recorded`: the depth-averaged current (2,) [m/s] that the file
-    holds; `modelled`: the speed through water comes from depth and pitch.
+    holds; `modelled`: the speed through water comes from depth and pitch; `max_depth` [m], or None if unknown.
     """
 
     name: str
@@ -71,6 +73,7 @@ class DiveRecord:
     drift: Array | None = None
     recorded: Array | None = None
     modelled: bool = False
+    max_depth: float | None = None
 
 
 def displacement(start: tuple[float, float], end: tuple[float, float]) -> Array:
@@ -95,8 +98,8 @@ def read_dive_records(
     path = Path(file)
     if path.suffix.lower() in (".nc", ".nc4", ".cdf"):
         return _track_dives(path, columns or {}, declination, attack)
-    header, rows = read_table(path)
-    found = find_columns(path.name, header, columns or {}, COLUMNS)
+    header, rows = read_table(path, "the file of dives", "dive", MOST_DIVES)
+    found = find_columns(path.name, header, COLUMNS, columns or {})
     listed = f"; it has: {', '.join(header)}"
     for what in NEEDED:
         require(what in found, f"{path.name} has no column `{what}`; name it by --column {what}=COLUMN{listed}")
@@ -156,6 +159,7 @@ def _dive(where: str, row: Mapping[str, str], way: Sequence[str], declination: f
         surface=number("surface") if row.get("surface") else 0.0,
         drift=pair("drift_east", "drift_north") if row.get("surface") else None,
         recorded=pair("recorded_east", "recorded_north"),
+        max_depth=number("max_depth") if row.get("max_depth") else None,
     )
 
 
@@ -216,6 +220,7 @@ def _track_dives(path: Path, columns: Mapping[str, str], declination: float, att
                 over_ground=displacement(start, end),
                 through_water=dead_reckoned(time[some], np.radians(heading[some] + declination), speed),
                 modelled=True,
+                max_depth=float(depth[a:b].max()),
             )
         )
     require(

@@ -34,6 +34,8 @@ NO_CLOCK: dict[str, dict[str, Any]] = {
 }
 
 
+EARLIEST = " by the earliest way to each node"
+"""Fronts with the clock running follow no later ways; a route may."""
 PASSING, STILL = ", as the route passes nearest", "FROZEN: all legs in the current of the departure"
 """Texts of figures: PASSING gives the time of the currents if the clock runs, STILL says that it does not run."""
 

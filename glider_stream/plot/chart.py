@@ -80,7 +80,8 @@ def plot_chart(
         if path.departs is not None:
             arrives = path.departs + timedelta(seconds=path.travel_time)
             text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
-        text += f"; {STILL}" if path.frozen else ""
+        still = path.frozen or (fronts is not None and fronts[0].frozen)
+        text += f"; {STILL}" if still else ""
         figure = new_figure(14.0, 8.6, f"{title}: {text}" if title else f"Route: {text}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
@@ -90,7 +91,8 @@ def plot_chart(
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
         when = PASSING if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
-        every = "" if fronts is None else f", and what is reached every {fronts[1]:g} h"
+        # on a line of its own: a long title would run into the next panel's
+        every = "" if fronts is None else f",\nand what is reached every {fronts[1]:g} h{fronts[0].ways}"
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
         line = _draw_route(ax, frame, rows, stops, clock)

@@ -12,8 +12,9 @@ from ..base.settings import require
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
 from ..search.path import Path
+from ..water.inspect import is_steady
 from .along import placed
-from .canvas import check_figure, save_figure
+from .canvas import EARLIEST, check_figure, save_figure
 from .chart import plot_chart
 from .fronts import Fronts, fronts_of
 from .page import PAGE, save_page
@@ -86,7 +87,9 @@ def draw_route(
         route = placed(route, problem)
         every: tuple[Fronts, float] | None = None
         if fronts is not None:
-            every = fronts_of(position, arrivals(route.start), terrain), fronts
+            reached, changes = fronts_of(position, arrivals(route.start), terrain), not is_steady(flow)
+            frozen = changes and problem.frozen
+            every = reached._replace(ways=EARLIEST if changes and not frozen else "", frozen=frozen), fronts
         if output is not None and is_page(output):
             save_page(output, flow, terrain, problem, position, route, depths, every, title)
             return None

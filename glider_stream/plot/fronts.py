@@ -24,12 +24,17 @@ FRONT = "#7a1f6b"
 
 
 class Fronts(NamedTuple):
-    """Places x, y (n,) [m], the earliest arrival there [s] at any depth, and triangles (m, 3) between them."""
+    """Places x, y (n,) [m], the earliest arrival there [s] at any depth, and triangles (m, 3) between them.
+
+    `ways` is a text on the ways that were followed; `frozen`: they meet the current of the departure.
+    """
 
     x: Array
     y: Array
     time: Array
     triangles: NDArray[np.intp]
+    ways: str = ""
+    frozen: bool = False
 
 
 def fronts_of(position: Array, arrival: Array, terrain: Terrain) -> Fronts:

@@ -46,12 +46,24 @@ const onGrid = (values, columns, rows, fx, fy) => {
 };
 const inside = (x, y) => x >= west && x <= east && y >= south && y <= north;
 
-// the current [m/s] at a place and one of the depths
-const currentAt = (x, y, level) => {
+// the current [mm/s] of each cell that the map shows: at one of the depths, linear in time
+const flowNow = { u: [], v: [] };
+const showCurrent = (level, time) => {
+  const { times } = data.current, n = Math.min(lastBelow(times, time), Math.max(times.length - 2, 0));
+  const m = Math.min(n + 1, times.length - 1), span = times[m] - times[n];
+  const share = span > 0 ? clamp((time - times[n]) / span, 0, 1) : 0;
+  for (const name of ["u", "v"]) {
+    const before = data.current[name][n][level], after = data.current[name][m][level];
+    flowNow[name] = before.map((value, k) => (value === null || after[k] === null ? null : between(value, after[k], share)));
+  }
+};
+
+// the shown current [m/s] at a place
+const currentAt = (x, y) => {
   const [columns, rows] = data.current.cells;
   const fx = ((x - west) / (east - west)) * columns - 0.5, fy = ((y - south) / (north - south)) * rows - 0.5;
-  const u = onGrid(data.current.u[level], columns, rows, fx, fy);
-  const v = onGrid(data.current.v[level], columns, rows, fx, fy);
+  const u = onGrid(flowNow.u, columns, rows, fx, fy);
+  const v = onGrid(flowNow.v, columns, rows, fx, fy);
   return u === null || v === null ? null : [u / 1000, v / 1000];
 };
 

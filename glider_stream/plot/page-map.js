@@ -25,7 +25,8 @@ const rgb = (hex) => [0, 1, 2].map((k) => parseInt(hex.slice(1 + 2 * k, 3 + 2 * 
 
 let speedPicture, landPicture;
 const paint = () => {
-  const stops = speedStops(), u = data.current.u[chosen.level], v = data.current.v[chosen.level];
+  showCurrent(chosen.level, chosen.time);
+  const stops = speedStops(), { u, v } = flowNow;
   speedPicture = painted(data.current.cells, (k) =>
     u[k] === null ? [0, 0, 0, 0] : [...mixed(stops, Math.hypot(u[k], v[k]) / 1000 / data.current.fastest), 255]);
   if (!data.seabed) return;
@@ -143,7 +144,7 @@ const drawArrows = () => {
   pen.beginPath();
   for (let x = Math.ceil(Math.max(worldX(0), west) / step) * step; x <= Math.min(worldX(view.width), east); x += step)
     for (let y = Math.ceil(Math.max(worldY(view.height), south) / step) * step; y <= Math.min(worldY(0), north); y += step) {
-      const current = currentAt(x, y, chosen.level), ground = seabedAt(x, y);
+      const current = currentAt(x, y), ground = seabedAt(x, y);
       if (!current || (ground !== null && (ground === 0 || ground < depth))) continue;
       const speed = Math.hypot(...current);
       // by the square root: slow water stays readable next to fast

@@ -37,6 +37,7 @@ const chooseTime = (time) => {
   chosen.time = clamp(time, 0, total);
   const here = glider(chosen.time);
   chooseLeg(here.leg);
+  if (data.current.times.length > 1) { paint(); redraw(); }
   placeMarks();
   placePlan();
   markProfile();
@@ -80,7 +81,7 @@ const chooseLegAt = (n) => chooseTime(n <= 0 ? 0 : legs[Math.min(n, legs.length 
 const readPlace = (px, py) => {
   const x = worldX(px), y = worldY(py);
   if (!inside(x, y)) { at("place").textContent = ""; return; }
-  const ground = seabedAt(x, y), current = currentAt(x, y, chosen.level), said = [placeName(x, y)];
+  const ground = seabedAt(x, y), current = currentAt(x, y), said = [placeName(x, y)];
   if (ground === 0) said.push("land");
   else if (ground !== null) said.push(`seabed ${ground} m`);
   if (current && (ground === null || ground > data.current.depths[chosen.level]))
@@ -109,6 +110,7 @@ data.current.depths.forEach((depth, n) => at("depth").add(new Option(`${depth} m
 at("depth").addEventListener("change", () => { chosen.level = +at("depth").value; paint(); redraw(); });
 if (fronts) {
   at("fronts-label").hidden = false;
+  at("ways").textContent = data.fronts.ways;
   const choices = [data.fronts.hours, 2 * data.fronts.hours, 4 * data.fronts.hours, 0];
   for (const hours of choices) at("fronts").add(new Option(hours ? `${+hours.toFixed(4)} h` : "none", hours));
   at("fronts").addEventListener("change", () => { chosen.every = +at("fronts").value; traceFronts(); redraw(); });

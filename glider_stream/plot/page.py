@@ -18,15 +18,15 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.output import replacing
 from ..base.settings import require
-from ..kernels.flow import Flow
+from ..kernels.flow import Flow, OceanGrid, cycle
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
 from .along import along
-from .canvas import PASSING, STILL, length_unit, thinned, time_text, time_unit, when_text
+from .canvas import STILL, length_unit, thinned, time_text, time_unit, when_text
 from .fronts import HOUR, Fronts, front_times
 from .route import map_depths
 from .seabed import sample_bottom
-from .water import Frame, Time, frame_of, passing, sample_field
+from .water import Frame, frame_of, sample_field
 
 if TYPE_CHECKING:
     from ..roadmap.problem import Problem
@@ -36,6 +36,9 @@ PAGE = ".html"
 SCRIPT = ("page-data.js", "page-map.js", "page-profile.js", "page.js")
 CURRENT_CELLS, SEABED_CELLS, LONLAT_POINTS = 56, 160, 33
 """Numbers of points along the longer side of the map; the page interpolates linearly between them."""
+MOST_MOMENTS, MOMENTS_A_CYCLE = 33, 16
+"""Numbers of times at which the page holds a current that changes: at most, and for each cycle of the flow."""
+AT_SLIDER = ", at the time of the slider"
 MOST_ROWS = 20_000
 """The most rows of a trajectory; a longer one is thinned, and its ends are kept."""
 FEWEST = 4  # rows of a leg
@@ -76,11 +79,17 @@ def save_page(
     frame = frame_of(problem, np.vstack([rows[:, 1:], path.legs[0].start, path.legs[-1].end]))
     levels = map_depths(position, frame, depths)
     held = {
-        **_words(flow, problem, path, title),
+        **_words(flow, problem, path, title, fronts is not None and fronts[0].frozen),
         "box": [*frame.x, *frame.y],
         "unit": dict(zip(("size", "name"), length_unit(frame.x, frame.y), strict=True)),
         "lonlat": _lonlat(frame),
-        "current": _current(flow, frame, levels, passing(path, problem.departure)),
+        "current": _current(
+            flow,
+            frame,
+            levels,
+            problem.departure if path.departure is None else path.departure,
+            _moments(flow, path),
+        ),
         "seabed": _seabed(terrain, frame),
         "legs": _legs(terrain, path),
         "fronts": None if fronts is None else _fronts(*fronts),
@@ -112,13 +121,13 @@ def page_text(held: dict[str, Any], title: str) -> str:
     return "".join([*pieces, rest])
 
 
-def _words(flow: Flow, problem: "Problem", path: "Path", title: str) -> dict[str, Any]:
+def _words(flow: Flow, problem: "Problem", path: "Path", title: str, frozen: bool) -> dict[str, Any]:
     unit, name = time_unit(path.travel_time)
-    when = PASSING if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
+    when = AT_SLIDER if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
     legs = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}"
     return {
         "title": title or "Route",
-        "said": f"{legs}, {time_text(path.travel_time)}" + (f"; {STILL}" if path.frozen else ""),
+        "said": f"{legs}, {time_text(path.travel_time)}" + (f"; {STILL}" if path.frozen or frozen else ""),
         "when": when,
         "time": {"size": unit, "name": name, "total": path.travel_time},
         "departs": None if path.departs is None else path.departs.timestamp() * 1e3,
@@ -141,18 +150,36 @@ def _lonlat(frame: Frame) -> dict[str, Any] | None:
     return {"points": LONLAT_POINTS, "lon": _numbers(lon, 6), "lat": _numbers(lat, 6)}
 
 
-def _current(flow: Flow, frame: Frame, depths: Array, t: Time) -> dict[str, Any]:
-    """Return the current [mm/s] at cell centres for each depth, row by row from the south."""
+def _moments(flow: Flow, path: "Path") -> Array:
+    """Return the times (n,) [s since departure] at which the page holds the current, linear between them."""
+    if not path.clock_runs:
+        return np.zeros(1)
+    total = path.travel_time
+    if isinstance(flow, OceanGrid):
+        assert path.departure is not None
+        known = flow.times - path.departure
+        moments = np.concatenate([[0.0], known[(known > 0) & (known < total)], [total]])
+        return moments[thinned(moments.size, MOST_MOMENTS)]
+    some = MOMENTS_A_CYCLE * total / cycle(flow)
+    count = MOST_MOMENTS if some == 0 else min(MOST_MOMENTS, 2 + math.ceil(some))
+    return np.linspace(0.0, total, count)
+
+
+def _current(flow: Flow, frame: Frame, depths: Array, begins: float, moments: Array) -> dict[str, Any]:
+    """Return the current [mm/s] at cell centres for each time and depth, row by row from the south.
+
+    The times are `moments` [s] after the route `begins` [s].
+    """
     x, y = frame.mesh(CURRENT_CELLS)
-    times = t(x, y) if callable(t) else t
-    fields = [sample_field(flow, x, y, -depth, times) for depth in depths]
-    fastest = max(float(np.nanmax(np.hypot(u, v), initial=0.0)) for u, v in fields)
+    fields = [[sample_field(flow, x, y, -depth, begins + since) for depth in depths] for since in moments]
+    fastest = max(float(np.nanmax(np.hypot(u, v), initial=0.0)) for layers in fields for u, v in layers)
     return {
+        "times": _numbers(moments, 1),
         "cells": [x.shape[1], x.shape[0]],
         "depths": _numbers(depths, 1),
         "fastest": fastest,
-        "u": [_numbers(1e3 * u, 0) for u, _ in fields],
-        "v": [_numbers(1e3 * v, 0) for _, v in fields],
+        "u": [[_numbers(1e3 * u, 0) for u, _ in layers] for layers in fields],
+        "v": [[_numbers(1e3 * v, 0) for _, v in layers] for layers in fields],
     }
 
 
@@ -213,6 +240,7 @@ def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:
     front_times(fronts, hours)  # raises InputError if it cannot be drawn
     return {
         "hours": hours,
+        "ways": fronts.ways,
         "last": float(fronts.time.max(initial=0.0)) / HOUR,
         "x": _numbers(fronts.x, 0),
         "y": _numbers(fronts.y, 0),

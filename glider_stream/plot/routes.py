@@ -11,7 +11,7 @@ from ..base.settings import require
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
 from ..water.inspect import is_steady
-from .canvas import INK, frozen, new_figure, styled, time_text, time_unit
+from .canvas import INK, STILL, frozen, new_figure, styled, time_text, time_unit
 from .scene import draw_current, draw_ends, draw_space, stretch
 from .water import checked_depths, frame_of
 
@@ -49,7 +49,9 @@ def plot_routes(
     frame = frame_of(problem, np.vstack([row[:, 1:] for row in rows.values()]))
     level = 0.5 * (frame.top + frame.bottom) if depth is None else float(checked_depths([depth], frame)[0])
     with styled():
-        figure = new_figure(13.0, 9.4, "Routes side by side")
+        still = [name for name, path in paths.items() if path.frozen]
+        told = f"; {', '.join(still)}: {STILL}" if still else ""
+        figure = new_figure(13.0, 9.4, f"Routes side by side{told}")
         grid = figure.add_gridspec(2, 2, height_ratios=(2.0, 1.0))
         space = figure.add_subplot(grid[0, 0], projection="3d")
         draw_space(space, terrain, frame, position)

@@ -94,18 +94,19 @@ class Verification:
 
 
 def replayed_misses(
-    evaluator: Evaluator, departure: float, position: Array, source: Index, target: Index, values: Array
+    evaluator: Evaluator, departure: float | Array, position: Array, source: Index, target: Index, values: Array
 ) -> Array:
     """Return the distances (n,) [m] from their targets at which legs end when scipy's DOP853 flies them.
 
     The legs lead from `source` (n,) to `target` (n,), which are nodes of `position` (m, 3) [m]; `values` (n, 6)
-    are in the order of EDGE_FIELDS.
+    are in the order of EDGE_FIELDS. `departure` [s] is one time for all legs, or each leg's (n,).
     """
+    departs = np.broadcast_to(departure, len(values))
     column = {name: n for n, name in enumerate(EDGE_FIELDS)}
 
-    def rate(share: float, at: Array, z: Array, u: Array, v: Array, w: Array, duration: Array) -> Array:
+    def rate(share: float, at: Array, z: Array, u: Array, v: Array, w: Array, duration: Array, t: Array) -> Array:
         along = share * duration
-        flow_u, flow_v = velocities(evaluator.flow, *at.reshape(2, -1), z + along * w, departure + along).T
+        flow_u, flow_v = velocities(evaluator.flow, *at.reshape(2, -1), z + along * w, t + along).T
         return np.concatenate([(flow_u + u) * duration, (flow_v + v) * duration])
 
     off = np.empty(len(values))
@@ -116,8 +117,8 @@ def replayed_misses(
         along, w, duration = speed * np.cos(angle), speed * np.sin(angle), row[column["time"]]
         through = along * np.cos(heading), along * np.sin(heading), w
         path = solve_ivp(
-            rate, (0, 1), np.concatenate([x, y]), args=(z, *through, duration), method="DOP853", rtol=1e-10,
-            atol=1e-7, max_step=0.02,
+            rate, (0, 1), np.concatenate([x, y]), args=(z, *through, duration, departs[some]), method="DOP853",
+            rtol=1e-10, atol=1e-7, max_step=0.02,
         )  # fmt: skip
         end = *path.y[:, -1].reshape(2, -1), z + duration * w
         off[some] = np.linalg.norm(np.array(end) - goal, axis=0)

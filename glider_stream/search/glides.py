@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,7 @@ class Air:
     """Computes legs from `begin` to `end` (n, 3) [m] in the water of an evaluator, n legs at once."""
 
     evaluator: Evaluator
+    steps: ClassVar[Array] = STEPS
 
     def glide(self, begin: Array, end: Array, angle: Array, heading: Array, departs: float | Array) -> Glides:
         """Return the legs by Newton's method, from a guess of their controls (n,) [rad].
@@ -69,24 +70,23 @@ class Air:
         in which each leg leaves when the leg before it arrives.
         """
         angle, heading = angle.copy(), heading.copy()
-        climbs = end[:, 2] > begin[:, 2]
-        lowest, highest = self.angles(climbs)
+        lowest, highest = self.limits(begin, end)
         left: Array | float = departs
         for _ in range(MOST_STEPS):
-            time = (end[:, 2] - begin[:, 2]) / self.sinking(angle, climbs)
+            time = self.times(begin, end, angle)
             if np.ndim(departs) == 0:
                 left = departs + np.concatenate([[0.0], np.cumsum(time)[:-1]])
             of = np.column_stack([begin, left, end[:, 2], angle, heading])
-            ends = self._ends(np.stack([of, *(of + _step(n) for n in (ANGLE, HEADING))]), climbs)
+            ends = self._ends(np.stack([of, *(of + self._step(n) for n in (ANGLE, HEADING))]))
             off = end[:, :2] - ends[0]
             miss = np.hypot(*off.T)
             if (miss <= CLOSE).all() or not np.isfinite(miss).any():
                 break
-            by_angle, by_heading = ((ends[1 + n] - ends[0]) / STEPS[ANGLE + n] for n in range(2))
+            by_angle, by_heading = ((ends[1 + n] - ends[0]) / self.steps[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
             turn = np.where(np.isfinite(turn), turn, 0.0)
-            longest = np.abs(turn).max(axis=1, initial=0.0)
-            turn *= np.minimum(1.0, LONGEST_TURN / np.maximum(longest, LONGEST_TURN))[:, None]
+            longest = np.maximum(np.abs(turn[:, 0]) / self._longest(angle), np.abs(turn[:, 1]) / LONGEST_TURN)
+            turn /= np.maximum(1.0, longest)[:, None]
             angle, heading = np.clip(angle + turn[:, 0], lowest, highest), heading + turn[:, 1]
         return Glides(angle, heading, time, np.asarray(left), miss)
 
@@ -95,55 +95,56 @@ class Air:
 
         `one_sided` uses half the flights and is less accurate; that is enough to compare two derivatives.
         """
-        climbs = end[:, 2] > begin[:, 2]
-        of = np.column_stack([begin, glides.departs, end[:, 2], glides.angle, glides.heading])
+        of = self._rows(begin, end, glides)
         if one_sided:
-            ends = self._ends(np.stack([of, *(of + _step(n) for n in range(7))]), climbs)
-            by = (ends[1:] - ends[0]) / STEPS[:, None, None]
+            ends = self._ends(np.stack([of, *(of + self._step(n) for n in range(7))]))
+            by = (ends[1:] - ends[0]) / self.steps[:, None, None]
         else:
-            beside = [of + sign * _step(n) for n in range(7) for sign in (1.0, -1.0)]
-            ends = self._ends(np.stack(beside), climbs)
-            by = (ends[0::2] - ends[1::2]) / (2 * STEPS[:, None, None])  # (7, n, 2)
+            beside = [of + sign * self._step(n) for n in range(7) for sign in (1.0, -1.0)]
+            ends = self._ends(np.stack(beside))
+            by = (ends[0::2] - ends[1::2]) / (2 * self.steps[:, None, None])  # (7, n, 2)
         # the leg must end at its stop, so the control undoes every other change of the leg's end
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
         control = np.stack([_solve(by[ANGLE], by[HEADING], off) for off in moved], axis=1)
         angle = control[..., 0]
+        return Slopes(self._time_slopes(begin, end, glides, angle), angle, control[..., 1])
+
+    def _time_slopes(self, begin: Array, end: Array, glides: Glides, angle: Array) -> Array:
+        """Return the derivatives (n, 7) of the times, from those of the controls `angle` (n, 7)."""
+        climbs = end[:, 2] > begin[:, 2]
         sinks = self.sinking(glides.angle, climbs)
         ahead, behind = (self.sinking(glides.angle + sign * STEPS[ANGLE], climbs) for sign in (1.0, -1.0))
         change = (ahead - behind) / (2 * STEPS[ANGLE])
         time = -(glides.time * change / sinks)[:, None] * angle
         time[:, 2] -= 1 / sinks
         time[:, 5] += 1 / sinks
-        return Slopes(time, angle, control[..., 1])
+        return np.asarray(time)
 
     def aimed(self, begin: Array, end: Array, glides: Glides, slopes: Slopes, moved: Array) -> Glides:
         """Return guesses of legs, to first order, after their starts and ends have `moved` (n, 6) [m]."""
-        climbs = end[:, 2] > begin[:, 2]
-        lowest, highest = self.angles(climbs)
         angle = glides.angle + (slopes.angle[:, :6] * moved).sum(axis=1)
         heading = glides.heading + (slopes.heading[:, :6] * moved).sum(axis=1)
         known = np.isfinite(angle) & np.isfinite(heading)
-        angle = np.clip(np.where(known, angle, glides.angle), lowest, highest)
+        angle = np.clip(np.where(known, angle, glides.angle), *self.limits(begin, end))
         heading = np.where(known, heading, glides.heading)
-        time = (end[:, 2] - begin[:, 2]) / self.sinking(angle, climbs)
-        return Glides(angle, heading, time, glides.departs, np.zeros(len(angle)))
+        return Glides(angle, heading, self.times(begin, end, angle), glides.departs, np.zeros(len(angle)))
 
     def fit(self, begin: Array, end: Array, glides: Glides) -> NDArray[np.bool_]:
         """Return a mask (n,) of the legs that stay in the flow and in open water."""
         fits = np.zeros(len(glides.time), np.bool_)
         start = np.column_stack([begin, glides.departs])
-        through = self._through(glides.angle, glides.heading, end[:, 2] > begin[:, 2])
+        through, _ = self._flights(self._rows(begin, end, glides))
         task = partial(legs_fit, self.evaluator.medium, start, through, glides.time, fits)
         in_parallel(task, len(fits), LEGS_AT_ONCE)
         return fits
 
-    def along(self, begin: Array, end: Array, glides: Glides, share: float) -> Array:
-        """Return the positions (n, 3) [m] of legs after a share of their vertical way."""
-        climbs, height = end[:, 2] > begin[:, 2], begin[:, 2] + share * (end[:, 2] - begin[:, 2])
+    def along(self, begin: Array, end: Array, glides: Glides, share: float | Array) -> Array:
+        """Return the positions (n, 3) [m] of legs after a share of their vertical way, one for all or (n,)."""
+        height = begin[:, 2] + share * (end[:, 2] - begin[:, 2])
         of = np.column_stack([begin, glides.departs, height, glides.angle, glides.heading])
-        return np.column_stack([self._ends(of[None], climbs)[0], height])
+        return np.column_stack([self._ends(of[None])[0], height])
 
     def angles(self, climbs: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return the shallowest and the steepest glide angle of each leg, (n,) each [rad]."""
@@ -164,28 +165,52 @@ class Air:
         """Return the vertical speed (n,) [m/s] at glide angles [rad]; it is negative in a dive."""
         return np.asarray(self.speed(angle, climbs) * np.sin(angle) * np.where(climbs, 1.0, -1.0))
 
-    def _through(self, angle: Array, heading: Array, climbs: NDArray[np.bool_]) -> Array:
+    def through(self, angle: Array, heading: Array, climbs: NDArray[np.bool_]) -> Array:
+        """Return the velocities through water (n, 3) [m/s] of controls (n,) [rad]."""
         along = self.speed(angle, climbs) * np.cos(angle)
         return np.stack([along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1)
 
-    def _ends(self, of: Array, climbs: NDArray[np.bool_]) -> Array:
+    def times(self, begin: Array, end: Array, angle: Array) -> Array:
+        """Return the times (n,) [s] of legs with glide angles (n,) [rad]."""
+        rise = end[:, 2] - begin[:, 2]
+        return np.asarray(rise / self.sinking(angle, rise > 0))
+
+    def limits(self, begin: Array, end: Array) -> tuple[Array, Array]:
+        """Return the least and the greatest glide angle of each leg, (n,) each [rad]."""
+        return self.angles(end[:, 2] > begin[:, 2])
+
+    def _longest(self, angle: Array) -> Array | float:
+        """Return by how much a Newton step may change the glide angles."""
+        return LONGEST_TURN
+
+    def _rows(self, begin: Array, end: Array, glides: Glides) -> Array:
+        """Return the parameters (n, 7) of legs."""
+        return np.column_stack([begin, glides.departs, end[:, 2], glides.angle, glides.heading])
+
+    def _flights(self, row: Array) -> tuple[Array, Array]:
+        """Return the velocities through water (n, 3) [m/s] and the times (n,) [s] of legs with parameters (n, 7).
+
+        A step that changes a height never turns a dive into a climb: it is shorter than any leg's rise.
+        """
+        rise = row[:, Z_END] - row[:, Z]
+        through = self.through(row[:, ANGLE], row[:, HEADING], rise > 0)
+        return through, rise / through[:, 2]
+
+    def _ends(self, of: Array) -> Array:
         """Return the ends x, y (m, n, 2) [m] of legs with parameters (m, n, 7)."""
-        many = np.broadcast_to(climbs, of.shape[:2]).ravel()
         row = of.reshape(-1, 7)
-        through = self._through(row[:, ANGLE], row[:, HEADING], many)
-        time = (row[:, Z_END] - row[:, Z]) / through[:, 2]
+        through, time = self._flights(row)
         start = np.ascontiguousarray(row[:, [X, Y, Z, T]])
         ends = np.full((len(row), 2), np.nan)
         task = partial(fly_legs, self.evaluator.flow, start, through, time, self.evaluator.integration.dt, ends)
         in_parallel(task, len(row), LEGS_AT_ONCE)
         return ends.reshape(*of.shape[:2], 2)
 
-
-def _step(n: int) -> Array:
-    """Return the step (7,) that changes only parameter `n` of a leg."""
-    step = np.zeros(7)
-    step[n] = STEPS[n]
-    return step
+    def _step(self, n: int) -> Array:
+        """Return the step (7,) that changes only parameter `n` of a leg."""
+        step = np.zeros(7)
+        step[n] = self.steps[n]
+        return step
 
 
 def _solve(by_first: Array, by_second: Array, off: Array) -> Array:

@@ -35,8 +35,9 @@ class Aim:
     """The aim of a search: the least time, or with `by_cost` the least cost; the cost must be below `cost_below`.
 
     With `front` the search finds every way to the goal for which no other way is better in both. Labels in
-    different `bins` [s] of time are kept side by side. No label is later than `latest` [s]. Ways whose arrival
-    [s], or cost if `by_cost`, is not less than `below` are dropped.
+    different `bins` [s] of time are kept side by side. No label is later than `latest` [s]. The search ends
+    `patience` [s] after the last time at which it comes to a place for the first time. Ways whose arrival [s], or
+    cost if `by_cost`, is not less than `below` are dropped.
     """
 
     by_cost: bool = False
@@ -44,6 +45,7 @@ class Aim:
     front: bool = False
     bins: float | None = None
     latest: float = math.inf
+    patience: float = math.inf
     below: float = math.inf
 
 
@@ -95,7 +97,8 @@ class Label:
 class LabelSearch:
     """A search over the legs of an expansion, from its start; `labels` holds all labels that were kept.
 
-    `whole` is False if the search ended because the expansion was spent.
+    `whole` is False if the search ended because the expansion was spent. No label later than `until` [s] is
+    expanded.
     """
 
     def __init__(
@@ -136,15 +139,21 @@ class LabelSearch:
         self.below = aim.below
         self.cost_below = aim.cost_below
         self.began = departure
+        self.until = departure + aim.patience
+        self.late: list[tuple[float, float, int, int]] = []
         first = Label(expansion.start, departure, 0.0, True, 0, departure)
         self._keep(first, self._criteria(first.place, departure, 0.0, True, 0, departure))
 
     def settled(self) -> Iterator[int]:
         """Yield the numbers of labels when they become final; a label that is not at a goal is then expanded."""
         while self.queue:
-            _, _, _, number = heapq.heappop(self.queue)
+            entry = heapq.heappop(self.queue)
+            number = entry[-1]
             label = self.labels[number]
             if not label.open:
+                continue
+            if label.time > self.until:
+                self.late.append(entry)
                 continue
             label.open = False
             final = not self.is_goal[label.place]
@@ -246,6 +255,7 @@ class LabelSearch:
             if entry[0] >= self.below or not (sure or len(chosen) < AT_ONCE):
                 break
             waits = entry[-1] not in self.fans and label.place not in seen and not self.is_goal[label.place]
+            waits &= label.time <= self.until
             if waits and label.place < self.expansion.nodes:
                 chosen.append(entry[-1])
                 seen.add(label.place)
@@ -286,6 +296,8 @@ class LabelSearch:
     def _keep(self, label: Label, criteria: Array) -> None:
         """Keep a label at its place, and drop the labels that are worse."""
         place, number = label.place, len(self.labels)
+        if (self.holder[place] < 0).all():
+            self._go_on_until(label.time + self.aim.patience)
         beaten = (criteria <= self.best[place]).all(axis=1)
         for other in self.holder[place][beaten & (self.holder[place] >= 0)]:
             self.labels[other].open = False
@@ -304,6 +316,14 @@ class LabelSearch:
             # other labels may be as good as the best so far, but no better
             self.below = min(self.below, key + 1e-9)
         heapq.heappush(self.queue, (key, label.time, place, number))
+
+    def _go_on_until(self, time: float) -> None:
+        """Let the search go on until `time` [s] if it would end before, and take the late labels back."""
+        if time > self.until:
+            self.until = time
+            for entry in self.late:
+                heapq.heappush(self.queue, entry)
+            self.late = []
 
 
 def _any_beats(held: Array, criteria: Array) -> Bools:

@@ -17,7 +17,6 @@ from ..kernels import flow as kernel
 from ..kernels.control import CLIMB, DIVE, Polar, vertical_speed
 from ..roadmap.problem import Problem
 from ..vehicle.cost import Cost
-from ..water.inspect import is_steady
 
 DIRECTIONS = 16
 CELLS = 64
@@ -127,8 +126,8 @@ def greatest(
     """
     if isinstance(flow, kernel.OceanGrid):
         return _of_grid(flow, x, y, size, z, since, directions)
-    period = 0.0 if is_steady(flow) else getattr(flow, "period", None)
-    if period is None:  # the flow has neither a period nor a grid, so no set of times is enough
+    period = kernel.cycle(flow)
+    if math.isinf(period):  # the flow has neither a period nor a grid, so no set of times is enough
         return np.full((directions.shape[1], x.size, y.size), flow.extent.max_speed)
     heights, moments = PERIODIC if period else STEADY
     finer = (np.concatenate([side - size / 4, side + size / 4]) for side in (x, y))

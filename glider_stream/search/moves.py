@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array, Index
-from .glides import Glides
-from .polish import Chain, Polisher
+from .free import FreePolisher
+from .polish import Chain, Effort, Polisher
+from .yos import with_yos
 
 CUT_PAYS = 1e-3
 """Cutting each leg of a route in two must gain this share of its cost, because pilots prefer few legs."""
@@ -20,25 +21,33 @@ MOST_LEGS = 400
 MOST_COUNTS = 12
 """At most this many numbers of yos are tried."""
 MOST_SINGLE = 24
-"""A route with more legs gets no single yos; its number of yos is found for the whole route."""
-MOST_TRIES = 24
-"""At most this many single yos are tried."""
-TRIAL_MOVES = 6
-"""A route that is only tried gets at most this many Newton steps for each barrier."""
+"""A route with more legs gets no small yos; its number of yos is found for the whole route."""
+TRIAL = Effort(moves=6)
+"""How long a route is polished that is only tried."""
+ROUGH = Effort(moves=15, enough=1e-4, barriers=1)
+"""How long a route is polished that is changed afterwards."""
+PIECES = 16
+"""A route that may hold its depth has about this many legs; with more the search ends in worse places."""
+HEIGHTS = (1.3, 1.5, 1.8, 2.5)
+"""Small yos are this many times as high as the least change of depth; the later ones are for routes that cannot
+be flown with the first."""
 YO_PAYS = 1e-3
-"""A single yo must gain this share of the cost."""
+"""A yo must gain this share of the cost."""
 PAYS = 1e-5
 """Another number of yos must gain this share of the cost."""
 
 
 def improve(polisher: Polisher, chain: Chain) -> Chain:
     """Return the polished route, with as many yos and cuts as pay; it never costs more than the old one."""
+    if polisher.single_yos and len(chain.glides.time) <= MOST_SINGLE:
+        chain = polisher.polish(chain, ROUGH)
+        more = _with_small_yos(polisher, chain)
+        if more is not None:
+            return more
     best = polisher.polish(chain)
     if len(best.glides.time) > MOST_LEGS:
         return best
     best = _best_count(polisher, best)
-    if polisher.single_yos and len(best.glides.time) <= MOST_SINGLE:
-        best = _with_more_yos(polisher, best)
     for _ in range(MOST_CUTS):
         if 2 * len(best.glides.time) > MOST_LEGS:
             break
@@ -49,43 +58,24 @@ def improve(polisher: Polisher, chain: Chain) -> Chain:
     return _joined(polisher, best)
 
 
-def _with_more_yos(polisher: Polisher, chain: Chain) -> Chain:
-    """Return the route with yos added to single legs, the longest leg first, until no yo pays."""
-    tries = 0
-    while tries < MOST_TRIES:
-        for leg in np.argsort(-chain.glides.time, kind="stable").tolist():
-            tries += 1
-            more = _zigzag(polisher, chain, leg)
-            if more is not None and more.cost < (1 - YO_PAYS) * chain.cost:
-                chain = polisher.polish(more)
-                break
-            if tries == MOST_TRIES:
-                break
-        else:
-            break
-    return chain
+def _with_small_yos(polisher: Polisher, chain: Chain) -> Chain | None:
+    """Return the polished route with small yos along the best way of a glider that may hold its depth.
 
-
-def _zigzag(polisher: Polisher, chain: Chain, leg: int) -> Chain | None:
-    """Return the route with a small yo in the middle of a leg, polished; None if it cannot be flown."""
-    glides, (begin, end) = chain.glides, chain.stops[leg : leg + 2]
-    here = slice(leg, leg + 1)
-    of = Glides(*(values[here] for values in glides))
-    ahead, back = (
-        polisher.air.along(chain.stops[here], chain.stops[leg + 1 : leg + 2], of, share)[0]
-        for share in (0.4, 0.6)
-    )
-    rise = end[2] - begin[2]
-    way_back = math.copysign(max(0.2 * abs(rise), 1.2 * polisher.least_rise), rise)
-    ahead[2], back[2] = begin[2] + 0.5 * (rise + way_back), begin[2] + 0.5 * (rise - way_back)
-    stops = np.concatenate([chain.stops[: leg + 1], [ahead, back], chain.stops[leg + 1 :]])
-    steeper = np.arctan((1 + way_back / rise) / 0.8 * np.tan(glides.angle[leg]))
-    lowest, highest = polisher.air.angles(np.diff(stops[:, 2]) > 0)
-    angle = np.insert(glides.angle, leg, [steeper, glides.angle[leg]])
-    angle[leg + 2] = steeper
-    heading = np.insert(glides.heading, leg, [glides.heading[leg]] * 2)
-    found = polisher.chain(stops, np.clip(angle, lowest, highest), heading)
-    return None if found is None else polisher.polish(found, TRIAL_MOVES)
+    None if there is none, or if it does not gain YO_PAYS for each yo more.
+    """
+    free = FreePolisher(polisher.problem, frozen=polisher.frozen)
+    way = free.from_route(polisher, chain, max(PIECES, len(chain.glides.time)))
+    if way is None:
+        return None
+    way = free.best(way)
+    for height in HEIGHTS:
+        found = with_yos(polisher, free, way, height * polisher.least_rise)
+        if found is not None:
+            found = _joined(polisher, polisher.polish(found, ROUGH))
+            yos = (len(turns(found.stops)) - len(turns(chain.stops))) / 2
+            pays = found.cost < (1 - YO_PAYS * max(yos, 0.0)) * chain.cost
+            return found if pays else None
+    return None
 
 
 def _best_count(polisher: Polisher, chain: Chain) -> Chain:
@@ -179,7 +169,7 @@ def _respaced(polisher: Polisher, chain: Chain, legs: int) -> Chain | None:
     lowest, highest = polisher.air.angles(rise > 0)
     angle = np.clip(np.arctan2(np.abs(rise) / time, np.hypot(*through.T)), lowest, highest)
     found = polisher.chain(stops, angle, np.arctan2(through[:, 1], through[:, 0]))
-    return None if found is None else polisher.polish(found, TRIAL_MOVES)
+    return None if found is None else polisher.polish(found, TRIAL)
 
 
 def _cut(polisher: Polisher, chain: Chain) -> Chain | None:
@@ -189,7 +179,7 @@ def _cut(polisher: Polisher, chain: Chain) -> Chain | None:
     stops[::2] = chain.stops
     stops[1::2] = polisher.air.along(chain.stops[:-1], chain.stops[1:], glides, 0.5)
     found = polisher.chain(stops, np.repeat(glides.angle, 2), np.repeat(glides.heading, 2))
-    return None if found is None else polisher.polish(found, TRIAL_MOVES)
+    return None if found is None else polisher.polish(found, TRIAL)
 
 
 def _joined(polisher: Polisher, chain: Chain) -> Chain:

@@ -32,17 +32,15 @@ BARRIERS = (1e-4, 5e-6)
 """The weights of the barrier, one after the other, in shares of the route's cost. The barrier keeps legs away
 from the ends of the glide polar, from the horizon and from the least rise. It moves an optimum away from such a
 limit by about this share."""
+ROOM = 1e-7
+"""A leg at a limit counts as this far away from it, as a share."""
 NEARER = 0.1
 """One step may reduce the distance of a leg to such a limit at most to this share of it."""
 CURVED = (20.0, 20.0, 8.0)
 """A stop is moved by this much along x, y, z [m] to measure second derivatives. The step is wide enough to pass
 over the kinks of a grid, where first derivatives jump."""
-ENOUGH = 3e-5
-"""A step that gains a smaller share of the cost counts as small."""
 SMALL_STEPS = 2
 """Polishing ends after this many small steps in a row; a single small step may come from a kink."""
-MOST_MOVES = 30
-"""At most this many steps are made for each barrier."""
 SHORTENED = 6
 """A step is shortened at most this many times if its route cannot be flown or gains nothing."""
 DAMPED, FREED = 10.0, 0.1
@@ -51,6 +49,18 @@ STIFF = 1e3
 """With this damping a step moves almost nothing, so polishing ends."""
 FAR = 0.5
 """In one step a stop moves at most by this share of the longer of its two legs."""
+
+
+class Effort(NamedTuple):
+    """How long a route is polished.
+
+    `moves` is the greatest number of steps for each barrier. A step that gains less than the share `enough` of
+    the cost counts as small. Only the first of BARRIERS are used, as many as `barriers` says.
+    """
+
+    moves: int = 30
+    enough: float = 3e-5
+    barriers: int = len(BARRIERS)
 
 
 class Chain(NamedTuple):
@@ -102,10 +112,20 @@ class Polisher:
         return Chain(stops, glides, self.cost(stops, glides))
 
     def chain_of(self, path: Path) -> Chain | None:
-        """Return a path as a chain with exact legs; None if it cannot be flown."""
+        """Return a path as a chain with exact legs; None if it cannot be flown.
+
+        A leg that passes its stop within the tolerance may be too steep to end there. Then the legs meet where
+        they were flown to.
+        """
         stops = np.array([path.legs[0].start, *(leg.end for leg in path.legs)])
         angle = np.array([abs(leg.glide_angle) for leg in path.legs])
-        return self.chain(stops, angle, np.array([leg.heading for leg in path.legs]))
+        heading = np.array([leg.heading for leg in path.legs])
+        found = self.chain(stops, angle, heading)
+        if found is None and len(path.legs) > 1:
+            flown = [leg.trajectory[-1, 1:] for leg in path.legs[:-1]]
+            stops[1:-1] = [old if self.stays(old) else new for old, new in zip(stops[1:-1], flown, strict=True)]
+            found = self.chain(stops, angle, heading)
+        return found
 
     def hops(self, chain: Chain) -> list[Hop]:
         """Return the legs of a route in the form from which a path is made."""
@@ -127,17 +147,26 @@ class Polisher:
         legs = price.per_second * float(glides.time.sum()) + price.per_leg * len(glides.time)
         return legs + float(self._pumped(stops[:-1, 2])[self._turns(stops)].sum())
 
-    def polish(self, chain: Chain, moves: int = MOST_MOVES) -> Chain:
-        """Improve the stops between start and goal by Newton's method, with at most `moves` steps per barrier."""
+    def worth(self, slopes: Slopes) -> Array:
+        """Return the cost (n,) of one second more of each leg of a route: the legs after it leave later."""
+        price = self.problem.evaluator.cost.kernel().per_second
+        late = np.zeros(len(slopes.time) + 1)
+        for n in range(len(slopes.time) - 1, -1, -1):
+            by_delay = 0.0 if self.frozen else slopes.time[n, 6]
+            late[n] = late[n + 1] + (price + late[n + 1]) * by_delay
+        return price + late[1:]
+
+    def polish(self, chain: Chain, effort: Effort = Effort()) -> Chain:  # noqa: B008  (frozen)
+        """Improve the stops between start and goal by Newton's method."""
         first = chain
-        for weight in BARRIERS:
+        for weight in BARRIERS[: effort.barriers]:
             damping, small = 1e-3, 0
-            for _ in range(moves if len(chain.stops) > 2 else 0):
+            for _ in range(effort.moves if len(chain.stops) > 2 else 0):
                 better, damping = self._step(chain, weight * chain.cost, damping)
                 if better is None:
                     break
                 gain, chain = chain.cost - better.cost, better
-                small = small + 1 if abs(gain) < ENOUGH * chain.cost else 0
+                small = small + 1 if abs(gain) < effort.enough * chain.cost else 0
                 if small == SMALL_STEPS:
                     break
         return min(first, chain, key=lambda route: route.cost)  # the barrier may have made it worse
@@ -168,7 +197,7 @@ class Polisher:
             stops = self._held(chain.stops + share[:, None] * move)
             stops = np.where((share > 0)[:, None], stops, chain.stops)
             shift = stops - chain.stops
-            turned = np.diff(stops[:, 2]) * np.diff(chain.stops[:, 2]) <= 0
+            turned = self._flips(stops, chain.stops)
             if turned.any():  # a dive has become a climb, or a climb a dive
                 share = np.where(_at_ends(turned), 0.4 * share, share)
                 continue
@@ -186,6 +215,10 @@ class Polisher:
             share *= 0.4
         return None
 
+    def _flips(self, stops: Array, before: Array) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the legs that changed from a dive to a climb, or from a climb to a dive."""
+        return np.asarray(np.diff(stops[:, 2]) * np.diff(before[:, 2]) <= 0, np.bool_)
+
     def _held(self, stops: Array) -> Array:
         stops = stops.copy()
         stops[1:-1, 2] = np.clip(stops[1:-1, 2], self.problem.lo[2], min(0.0, float(self.problem.hi[2])))
@@ -193,12 +226,16 @@ class Polisher:
 
     def _within(self, stops: Array, glides: Glides) -> NDArray[np.bool_]:
         """Return a mask (n,) of the legs that may be flown: in open water, within the horizon, not too short."""
-        integration = self.problem.evaluator.integration
         short = np.abs(np.diff(stops[:, 2])) < self.least_rise
-        late = glides.time > integration.dt * integration.steps
+        late = self._too_long(glides)
         late |= glides.departs + glides.time > self.problem.evaluator.flow.extent.t_hi
         fits = glides.exact & ~short & ~late & np.isfinite(glides.time)
         return self.air.fit(stops[:-1], stops[1:], glides) if fits.all() else np.asarray(fits, np.bool_)
+
+    def _too_long(self, glides: Glides) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the legs that last longer than the horizon."""
+        integration = self.problem.evaluator.integration
+        return np.asarray(glides.time > integration.dt * integration.steps, np.bool_)
 
     def _room(self, stops: Array, glides: Glides, slopes: Slopes | None) -> tuple[Array, Array]:
         """Return how far legs are from their four limits (n, 4), as shares, and its slopes (n, 4, 6) by ends."""
@@ -223,7 +260,7 @@ class Polisher:
             by[:, 1] = -by[:, 0]
             by[:, 2] = -slopes.time[:, :6] / horizon
             by[:, 3, 2], by[:, 3, 5] = -np.sign(rise) / depth, np.sign(rise) / depth
-        return np.maximum(room, 0.0) + 1e-7, by
+        return np.maximum(room, 0.0) + ROOM, by
 
     def _turns(self, stops: Array) -> NDArray[np.bool_]:
         """Return a mask (n,) of the legs that climb after a dive; a route begins as if it had dived."""
@@ -262,13 +299,7 @@ class _Step:
         """Compute the derivatives of a route, with a barrier of this weight."""
         stops, glides = chain.stops, chain.glides
         slopes = polisher.air.slopes(stops[:-1], stops[1:], glides)
-        price = polisher.problem.evaluator.cost.kernel().per_second
-        # the cost of one second of delay at each leg's end: the legs after it leave later
-        late = np.zeros(len(glides.time) + 1)
-        for n in range(len(glides.time) - 1, -1, -1):
-            by_delay = 0.0 if polisher.frozen else slopes.time[n, 6]
-            late[n] = late[n + 1] + (price + late[n + 1]) * by_delay
-        worth = price + late[1:]
+        worth = polisher.worth(slopes)
         room, by = polisher._room(stops, glides, slopes)
         leg = worth[:, None] * slopes.time[:, :6] - weight * (by / room[:, :, None]).sum(axis=1)
         bent = worth[:, None, None] * cls._curvature(polisher, stops, glides, slopes)

@@ -26,8 +26,10 @@ from .surfacing import Surfacing
 from .trade_off import TradeOff, none_within
 from .why_not import why_not
 
-MOST_BINS, FEWER_BINS = 240, 48
-"""The number of bins of time after departure in a search with bins: if the query asks for bins, and if not."""
+MOST_BINS = 240
+"""A search with bins of time ends so many bins after the departure."""
+PATIENCE = 48
+"""A search with bins that the query did not ask for also ends after so many bins without a node that is new."""
 LATER_FANS = 256
 """The second search, for a better path, uses this many fans; with few nodes they are enough for all ways."""
 TRIED_FANS = 32
@@ -91,45 +93,45 @@ class ClockPlanner(RoutePlanner):
         """Return the best of a path and of ways that reach some node later than the earliest way, with a note.
 
         The first bins are as long as a typical leg. They are halved until `LATER_FANS` fans are spent. If no path
-        is known, all ways in the first bins are followed, because a glider that the current carries away may come
-        back later and only then find a way on.
+        is known, all ways in the first bins are followed, as long as they come to nodes that are new: a glider
+        that the current carries away may come back later and only then find a way on.
         """
         durations = [float(label.row[TIME]) for label in search.labels if label.row is not None]
         if not durations or not self.assembly.changes or self.assembly.frozen:
             return path
         widest, departure = float(np.median(durations)), self.problem.departure
-        latest = departure + FEWER_BINS * widest
+        latest, patience = departure + MOST_BINS * widest, PATIENCE * widest
         fans = LATER_FANS if search.tally.fans <= LATER_FANS else min(TRIED_FANS, LATER_FANS)
         expansion = BoundedExpansion(self._expansion(ends), fans if path.found else math.inf)
-        best, width, finest, whole = path, widest, math.inf, True
+        best, width, finest, whole, until = path, widest, math.inf, True, departure
         while whole and width >= NARROWEST:
             below = (best.cost if search.by_cost else departure + best.travel_time) - BETTER
-            later = replace(aim, bins=width, latest=latest, below=below)
+            later = replace(aim, bins=width, latest=latest, patience=patience, below=below)
             # the reason for no path comes from the widest bins: only there were all ways surely followed
             found, again = self._first(ends, later, expansion, known=best.found or width < widest)
             best = found if found.found or (width == widest and not best.found) else best
             whole, expansion.most = again.whole, max(fans, expansion.found)
-            finest = width if whole else finest
+            if whole:
+                finest, until = (
+                    width,
+                    max(until, min(again.until, latest, self.problem.evaluator.flow.extent.t_hi)),
+                )
             width /= 2
         if not best.found:
-            until = moment(self.problem.departs, latest - departure)
-            looked = f"ways that come back to a node later were followed until {until}"
+            when = moment(self.problem.departs, until - departure)
+            looked = f"ways that come back to a node later were followed until {when}"
             return replace(best, why=f"{best.why}; {looked}, in bins of {finest:,.0f} s")
-        return best if whole else replace(best, notes=(*best.notes, self._in_part(again, finest)))
-
-    def _in_part(self, search: LabelSearch, finest: float) -> str:
-        """Return the note on a path for which not all ways that reach a node later were followed."""
-        start = search.expansion.start
-        least = float((search.cost_left if search.by_cost else search.left)[start])
-        bound = f"{least:,.0f} J" if search.by_cost else f"{least:,.0f} s"
-        how = "in part" if math.isinf(finest) else f"in bins of {finest:,.0f} s"
-        return (
-            f"ways that come to a node later than at the soonest were followed {how}; a better one may exist, "
-            f"none takes less than {bound}; set query.bins (seconds) to follow all of them, which takes longer"
-        )
+        if whole:
+            return best
+        next_width = min(widest, finest / 2)
+        note = _in_part(search.tally.fans, expansion.found, finest, next_width, best.travel_time)
+        return replace(best, notes=(*best.notes, note))
 
     def queries(self, start: ArrayLike | None, goals: Sequence[ArrayLike | None]) -> list[Path]:
-        """Return the cheapest paths from one point (3,) [m] to each of many, by one search."""
+        """Return the cheapest paths from one point (3,) [m] to each of many, by one search.
+
+        To several goals only the earliest way to each node is followed, so a path may exist that costs less.
+        """
         if len(goals) == 1:
             return [self.query(start, goals[0])]
         ends = self._ends(start, goals)
@@ -147,7 +149,7 @@ class ClockPlanner(RoutePlanner):
         return [self._path(search, expansion, first.get(n), ends, n) for n in range(len(goals))]
 
     def table(self, starts: Sequence[ArrayLike], goals: Sequence[ArrayLike]) -> Array:
-        """Return the costs (n, m) of the cheapest paths from n points (3,) [m] to m others; else inf."""
+        """Return the costs (n, m) of the cheapest paths from n points (3,) [m] to m others; see `queries`."""
         return np.array([[path.cost for path in self.queries(start, goals)] for start in starts]).reshape(
             len(starts), len(goals)
         )
@@ -266,3 +268,18 @@ class ClockPlanner(RoutePlanner):
                 f"or take currents that reach further; else {why}"
             )
         return replace(path, why=why, why_not=reason.as_dict(), expanded=search.tally.share)
+
+
+def _in_part(first: int, later: int, finest: float, bins: float, seconds: float) -> str:
+    """Return the note on a path for which not all ways that come to a node later were followed.
+
+    `first` and `later` fans were found for the first ways and for later ways. All ways were followed in bins of
+    `finest` [s], inf if in none, but not in `bins` [s]. The path takes some `seconds`.
+    """
+    whole = "" if math.isinf(finest) else f" and all that come {finest:,.0f} s apart"
+    more = math.ceil(seconds / bins)
+    return (
+        f"the earliest ways to {first:,} nodes were followed, and {later:,} later ways{whole}, which lead to no "
+        f"better route; who comes to a node later may still arrive earlier: query.bins = {bins:.0f} follows all "
+        f"ways that come so many seconds apart, with up to {more:,} times the work"
+    )

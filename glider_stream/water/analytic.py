@@ -19,18 +19,20 @@ BEYOND = 50.0
 
 @dataclass(frozen=True, kw_only=True)
 class AnalyticFlow:
-    """Settings that every analytic flow has: the box `x`, `y` [m] in which the flow is known, and `sampled`.
+    """Settings that every analytic flow has: where and when the flow is known, and `sampled`.
 
-    If `sampled` = [dx, dy, dz] [m] is given, the flow is evaluated once on a grid with at most these spacings and
-    interpolated trilinearly.
+    `x`, `y` [m] are the box in which the flow is known. A flow that changes is known at `times` [s], from the
+    first to the last; if they are left out, at all times. If `sampled` = [dx, dy, dz] [m] is given, the flow is
+    evaluated once on a grid with at most these spacings and interpolated trilinearly.
     """
 
     x: Range | None = None
     y: Range | None = None
+    times: Range | None = None
     sampled: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
-        for name, bounds in (("x", self.x), ("y", self.y)):
+        for name, bounds in (("x", self.x), ("y", self.y), ("times", self.times)):
             if bounds is not None:
                 check_range(bounds, f"flow.{name}")
         for spacing in self.sampled or ():
@@ -51,10 +53,13 @@ class AnalyticFlow:
         """Return the flow as the kernels read it; `z` [m, upward] is the range of heights that the plan uses."""
         kind, values = self.fields((-z[1], -z[0]))
         (x_lo, x_hi), (y_lo, y_hi) = self.x or ALWAYS, self.y or ALWAYS
-        usual = {"x_lo": x_lo, "x_hi": x_hi, "y_lo": y_lo, "y_hi": y_hi, "t_lo": -math.inf, "t_hi": math.inf}
+        t_lo, t_hi = self.times or ALWAYS
+        usual = {"x_lo": x_lo, "x_hi": x_hi, "y_lo": y_lo, "y_hi": y_hi, "t_lo": t_lo, "t_hi": t_hi}
         values = usual | values
         known = kernel.Extent(**{name: values.pop(name) for name in kernel.Extent._fields})
         result: kernel.Flow = kind(**values, extent=known)
+        fits = self.times is None or kernel.cycle(result) > 0
+        require(fits, "`flow.times` is for a flow that changes, and this one is steady; leave it out")
         return result
 
 
@@ -73,7 +78,10 @@ class Uniform(AnalyticFlow):
 
 @dataclass(frozen=True)
 class Vortex:
-    """psi = speed R sqrt(e) exp(-r^2 / 2R^2) exp(-((depth - depth_0) / H)^2); > 0 counter-clockwise."""
+    """psi = speed R sqrt(e) exp(-r^2 / 2R^2) exp(-((depth - depth_0) / H)^2); > 0 counter-clockwise.
+
+    Its centre is at x, y [m] at t = 0 and moves by `drift` [m/s] along x and y.
+    """
 
     x: float
     y: float
@@ -81,6 +89,7 @@ class Vortex:
     speed: float
     depth: float = 0.0
     thickness: float | None = None
+    drift: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         require_positive(self.radius, "flow.vortex.radius")
@@ -105,14 +114,34 @@ class Vortices(AnalyticFlow):
             for name in ("x", "y", "radius", "speed", "depth")
         }
         columns["thickness"] = np.array([vortex.thickness or math.inf for vortex in self.vortex])
-        bound = _speed_bound(columns, depth)
-        return kernel.Vortices, columns | {
-            "max_speed": bound,
-            "length_scale": float(columns["radius"].min()),
-        }
+        drifts = np.array([vortex.drift for vortex in self.vortex])
+        # vortices that move alike keep their distances
+        together = bool((drifts == drifts[0]).all())
+        bound = _speed_bound(columns, depth) if together else _speed_bound_anywhere(columns, depth)
+        values = columns | {"max_speed": bound, "length_scale": float(columns["radius"].min())}
+        if not drifts.any():
+            return kernel.Vortices, values
+        drift_x, drift_y = (np.ascontiguousarray(drifts[:, n]) for n in range(2))
+        return kernel.MovingVortices, values | {"drift_x": drift_x, "drift_y": drift_y}
 
 
-def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices: int = 8) -> float:
+def _shares_by_depth(vortex: dict[str, Array], depth: Range, slices: int = 8) -> list[Array]:
+    """Return for each slice of the depths an upper bound (n,) of each vortex's share of its peak speed."""
+    # a path may end deeper or shallower than its nodes, by a tolerance and a step
+    edges = np.linspace(depth[0] - BEYOND, depth[1] + BEYOND, slices + 1)
+    shares = []
+    for top, bottom in itertools.pairwise(edges):
+        off = np.maximum(np.maximum(top - vortex["depth"], vortex["depth"] - bottom), 0) / vortex["thickness"]
+        shares.append(np.exp(-off * off))
+    return shares
+
+
+def _speed_bound_anywhere(vortex: dict[str, Array], depth: Range) -> float:
+    """Return an upper bound of the total speed [m/s] of vortices that may meet: the sum of their peaks."""
+    return max(float(share @ np.abs(vortex["speed"])) for share in _shares_by_depth(vortex, depth)) * (1 + 1e-12)
+
+
+def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96) -> float:
     """Return an upper bound of the total speed [m/s].
 
     The domain is divided into cells. The bound of a cell is the sum of the maxima of all vortices in it.
@@ -122,8 +151,6 @@ def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices
     def rim(r: Array) -> Array:
         return np.asarray(speed[:, None, None] * r * np.exp(0.5 - 0.5 * r * r))
 
-    # a path may end deeper or shallower than its nodes, by a tolerance and a step
-    depth = (depth[0] - BEYOND, depth[1] + BEYOND)
     edges = [np.linspace((vortex[a] - 3 * radius).min(), (vortex[a] + 3 * radius).max(), cells + 1) for a in "xy"]
     # the nearest and the farthest point of each cell: their distances from each centre, in radii
     spans = []
@@ -138,10 +165,8 @@ def _speed_bound(vortex: dict[str, Array], depth: Range, cells: int = 96, slices
     inside = np.where((near <= 1) & (far >= 1), speed[:, None, None], np.maximum(rim(near), rim(far)))
     # outside the box the distance to every centre is at least three radii
     outside = float(rim(np.full((radius.size, 1, 1), 3.0)).sum())
-    worst = 0.0
-    for top, bottom in itertools.pairwise(np.linspace(depth[0], depth[1], slices + 1)):
-        off = np.maximum(np.maximum(top - vortex["depth"], vortex["depth"] - bottom), 0) / vortex["thickness"]
-        worst = max(worst, float((np.exp(-off * off)[:, None, None] * inside).sum(axis=0).max()))
+    shares = _shares_by_depth(vortex, depth)
+    worst = max(float((share[:, None, None] * inside).sum(axis=0).max()) for share in shares)
     return max(worst, outside) * (1 + 1e-12)
 
 
@@ -253,6 +278,38 @@ class Jet(AnalyticFlow):
         }
 
 
+@dataclass(frozen=True)
+class TidalJet(AnalyticFlow):
+    """A jet along x that turns with the tide: u = speed cos(2 pi (t - peak) / period) exp(-(2 dy / width)^2).
+
+    dy [m] is the distance from `y_centre`. At time `peak` [s] the current is `speed` [m/s] in the middle; half a
+    `period` [s] later it is as fast the other way. Give the box's `y` as the sides of a strait.
+    """
+
+    y_centre: float
+    width: float
+    speed: float
+    period: float
+    peak: float = 0.0
+
+    def check(self) -> None:
+        """Raise InputError unless width and period are positive."""
+        require_positive(self.width, "flow.width")
+        require_positive(self.period, "flow.period")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """Return the kernel's class and its fields."""
+        return kernel.TidalJet, {
+            "y": self.y_centre,
+            "width": self.width,
+            "speed": self.speed,
+            "period": self.period,
+            "peak": self.peak,
+            "max_speed": abs(self.speed),
+            "length_scale": self.width / 4,
+        }
+
+
 FLOWS: dict[str, type[AnalyticFlow]] = {
     "uniform": Uniform,
     "vortices": Vortices,
@@ -260,4 +317,5 @@ FLOWS: dict[str, type[AnalyticFlow]] = {
     "single-gyre": SingleGyre,
     "rankine": Rankine,
     "jet": Jet,
+    "tidal-jet": TidalJet,
 }

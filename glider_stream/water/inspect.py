@@ -12,9 +12,7 @@ from ..kernels.terrain import Terrain
 
 def is_steady(flow: kernel.Flow) -> bool:
     """Whether the flow is the same at all times."""
-    if isinstance(flow, kernel.Gyre):
-        return flow.epsilon == 0
-    return math.isinf(flow.extent.t_lo)
+    return kernel.cycle(flow) == 0
 
 
 def flow_sha256(flow: kernel.Flow | Terrain) -> str:

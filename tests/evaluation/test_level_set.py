@@ -58,6 +58,39 @@ def test_the_front_does_not_enter_land(problem):
     assert front.arrival() > 1.05 * free
 
 
+def test_nothing_comes_in_through_the_sides(problem):
+    """Where the current is weakest beside the box, a front that went round there would be too early."""
+    narrow = Uniform(-0.85, 0.0, y=(-60.0, 60.0)).kernel(HEIGHTS)
+
+    class Shear(Waters):
+        def current(self, at, since):
+            uv = super().current(at, since)
+            return uv * (1.0 - np.minimum(np.abs(at[:, 1]) / 120.0, 1.0))[:, None]
+
+    alone = replace(problem, start=np.array([0.0, 0.0, 0.0]), goal=np.array([150.0, 0.0, 0.0]))
+    alone = replace(alone, evaluator=replace(alone.evaluator, flow=narrow))
+    waters = Shear(alone, 2)
+    sides = Front(waters, 61, 20.0)
+    assert (sides.axes[1][0], sides.axes[1][-1]) == (-60.0, 60.0)
+    # the best way in a current of y alone: along the side, at a price for each metre east; there and back by the
+    # heading that is best at each y for that price
+    price = 1.0 / (waters.fastest - 0.425)
+    y, heading = np.linspace(0.0, 60.0, 401)[:, None], np.linspace(0.01, math.pi - 0.01, 2001)
+    east = waters.fastest * np.cos(heading) - 0.85 * (1.0 - y / 120.0)
+    per_metre = ((1.0 - price * east) / (waters.fastest * np.sin(heading))).min(axis=1)
+    best = 150.0 * price + 2.0 * 60.0 * per_metre.mean()
+    assert 0.98 * best < sides.arrival() <= best
+
+
+def test_a_strong_current_at_the_start_costs_no_sharpness(problem):
+    """The front begins where the current has carried the start, so an even current leaves nothing to guess."""
+    waters = Waters(problem, 2)
+    for nodes in (31, 61):
+        front = Front(waters, nodes, 60.0)
+        assert front.began == pytest.approx(60.0)
+        assert front.source - waters.ends[0] == pytest.approx(60.0 * np.array([0.3, -0.1]))
+
+
 def test_long_routes_are_bounded_in_two_dimensions(problem):
     assert dimensions_of(problem) == 3
     far = replace(problem, goal=problem.start + np.array([9000.0, 0.0, 0.0]))

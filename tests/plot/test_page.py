@@ -118,7 +118,7 @@ def test_it_holds_the_route(sea):
     x, y = west + (i + 0.5) / columns * (east - west), south + (j + 0.5) / rows * (north - south)
     for level, depth in enumerate(data["current"]["depths"]):
         u, v = plot.sample_field(scene.flow, x, y, -depth, scene.problem.departure)
-        kept = [data["current"][name][level][j * columns + i] for name in "uv"]
+        kept = [data["current"][name][0][level][j * columns + i] for name in "uv"]
         np.testing.assert_allclose(kept, [1e3 * u, 1e3 * v], atol=0.51)
     columns, rows = data["seabed"]["cells"]
     for (x, y), depth in ((PLACES["LAND"], 0), (PLACES["SEA"], None)):

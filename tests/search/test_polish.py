@@ -172,6 +172,16 @@ def test_energy_is_what_is_polished_where_the_cost_is_energy(problem):
     assert after.cost < chain.cost
 
 
+def test_legs_that_only_pass_their_stops_are_polished_too():
+    # a deep yo, whose dive is too steep to end at the node
+    road = glider_stream.open(roadmap())
+    ends = (0.0, 0.0, -75.0), (3.0, 0.0, -75.0)
+    before, after = road.query(*ends), road.query(*ends, polish=True)
+    assert before.legs[0].miss > 5.0
+    assert after.travel_time < 0.5 * before.travel_time
+    assert math.dist(after.legs[-1].trajectory[-1, 1:], ends[1]) < 0.01
+
+
 def test_a_rule_of_surfacing_is_kept():
     road = glider_stream.open(roadmap())
     rule = glider_stream.Surfacing(most_yos=1)

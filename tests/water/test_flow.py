@@ -10,15 +10,25 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from scipy.special import erf
 
-from glider_stream.kernels.flow import Extent, Flow, Grid, contains, mean_velocity, velocities, velocity
+from glider_stream.kernels.flow import Extent, Flow, Grid, contains, cycle, mean_velocity, velocities, velocity
 from glider_stream.scenario import read_scenario
-from glider_stream.water.analytic import DoubleGyre, Jet, Rankine, SingleGyre, Uniform, Vortex, Vortices
-from glider_stream.water.inspect import divergence_ratio
+from glider_stream.water.analytic import (
+    DoubleGyre,
+    Jet,
+    Rankine,
+    SingleGyre,
+    TidalJet,
+    Uniform,
+    Vortex,
+    Vortices,
+)
+from glider_stream.water.inspect import divergence_ratio, is_steady
 from glider_stream.water.sampled import sample_flow
 
 HEIGHTS = (-250.0, 0.0)
-KINDS = ("uniform", "vortices", "gyre", "rankine", "jet", "grid", "ocean")
+KINDS = ("uniform", "vortices", "gyre", "rankine", "jet", "tidal", "moving", "grid", "ocean")
 
 
 def scattered(flow, count, seed=0, reach=220.0):
@@ -66,12 +76,29 @@ def psi_jet(flow, x, y, z, t):
     return flow.speed * np.clip(y - flow.y, -flow.width / 2, flow.width / 2)
 
 
+def psi_tidal(flow, x, y, z, t):
+    half = flow.width / 2
+    now = flow.speed * np.cos(2 * np.pi * (t - flow.peak) / flow.period)
+    return now * half * math.sqrt(math.pi) / 2 * erf((y - flow.y) / half)
+
+
+def psi_moving(flow, x, y, z, t):
+    return sum(
+        psi_vortices(flow._replace(**{name: getattr(flow, name)[n : n + 1] for name in VORTEX}),
+                     x - t * flow.drift_x[n], y - t * flow.drift_y[n], z, t)
+        for n in range(flow.x.size)
+    )  # fmt: skip
+
+
+VORTEX = ("x", "y", "radius", "speed", "depth", "thickness")
 STREAM_FUNCTIONS = {
     "uniform": psi_uniform,
     "vortices": psi_vortices,
     "gyre": psi_gyre,
     "rankine": psi_rankine,
     "jet": psi_jet,
+    "tidal": psi_tidal,
+    "moving": psi_moving,
 }
 
 
@@ -194,6 +221,59 @@ def test_single_gyre_is_half_of_the_steady_double_one():
     assert single.extent.max_speed == pytest.approx(0.3 * math.pi)
 
 
+def test_the_tide_turns():
+    flow = TidalJet(0.0, 200.0, 0.9, 3600.0, peak=600.0).kernel(HEIGHTS)
+    now = [velocity(flow, 5.0, 0.0, -10.0, t)[0] for t in (600.0, 1500.0, 2400.0, 4200.0)]
+    assert now == pytest.approx([0.9, 0.0, -0.9, 0.9], abs=1e-12)
+    assert velocity(flow, 5.0, 100.0, -10.0, 600.0) == pytest.approx((0.9 / math.e, 0.0))
+
+
+def test_moving_vortices_are_vortices_that_have_moved(flows):
+    flow, t = flows["moving"], 1234.0
+    x, y, z, _ = scattered(flow, 500, seed=12)
+    still = Vortices(
+        tuple(
+            Vortex(*map(float, row))
+            for row in zip(
+                flow.x + t * flow.drift_x, flow.y + t * flow.drift_y, *(getattr(flow, n) for n in VORTEX[2:]),
+                strict=True,
+            )
+        )
+    ).kernel(HEIGHTS)  # fmt: skip
+    now, then = np.full(500, t), np.zeros(500)
+    np.testing.assert_allclose(velocities(flow, x, y, z, now), velocities(still, x, y, z, then), atol=1e-14)
+
+
+def test_vortices_that_may_meet_have_the_sum_of_their_speeds_as_bound():
+    away, towards = (Vortex(x, 0.0, 50.0, 0.5, drift=(d, 0.0)) for x, d in ((-300.0, 0.1), (300.0, -0.1)))
+    flow = Vortices((away, towards)).kernel(HEIGHTS)
+    assert flow.extent.max_speed == pytest.approx(1.0)
+    # side by side at 3,000 s: a point between them meets almost all of both
+    opposed = Vortices((away, Vortex(300.0, 100.0, 50.0, -0.5, drift=(-0.1, 0.0)))).kernel(HEIGHTS)
+    assert abs(velocity(opposed, 0.0, 50.0, 0.0, 3000.0)[0]) == pytest.approx(1.0)
+    assert opposed.extent.max_speed >= 1.0
+
+
+def test_each_flow_says_whether_it_changes_and_after_what_time_it_repeats(flows):
+    changing = {kind: cycle(flow) for kind, flow in flows.items() if not is_steady(flow)}
+    assert changing == {"gyre": 700.0, "tidal": 900.0, "moving": math.inf, "ocean": math.inf}
+    for t in (0.0, 333.0):
+        for kind in ("gyre", "tidal"):
+            before, after = (
+                velocity(flows[kind], 5.0, 20.0, -10.0, t + n * cycle(flows[kind])) for n in range(2)
+            )
+            assert before == pytest.approx(after, abs=1e-12)
+    still = DoubleGyre(amplitude=0.3, length=100.0, epsilon=0.0, period=7.0).kernel(HEIGHTS)
+    assert cycle(still) == 0.0
+
+
+def test_a_flow_that_changes_may_be_known_for_some_time_alone():
+    flow = TidalJet(0.0, 200.0, 0.9, 3600.0, times=(0.0, 7200.0)).kernel(HEIGHTS)
+    assert contains(flow, 0.0, 0.0, 7200.0)
+    assert not contains(flow, 0.0, 0.0, 7200.1)
+    assert (flow.extent.t_lo, flow.extent.t_hi) == (0.0, 7200.0)
+
+
 # bounds
 
 
@@ -203,7 +283,7 @@ def test_max_speed_bounds_every_flow(flows, kind):
     uv = velocities(flow, *scattered(flow, 100_000, seed=4))
     fastest = np.hypot(uv[:, 0], uv[:, 1]).max()
     assert fastest <= flow.extent.max_speed
-    assert flow.extent.max_speed <= {"vortices": 2.0, "gyre": 1.6}.get(kind, 1.3) * fastest
+    assert flow.extent.max_speed <= {"vortices": 2.0, "moving": 2.0, "gyre": 1.6}.get(kind, 1.3) * fastest
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -311,7 +391,7 @@ def test_flow_is_known_in_its_box_and_span_alone(flows):
         if math.isfinite(known.t_lo):
             assert not contains(flow, x, y, known.t_lo - 1.0), kind
             assert not contains(flow, x, y, known.t_hi + 1.0), kind
-    assert Counter(math.isfinite(flow.extent.x_lo) for flow in flows.values()) == {True: 3, False: 4}
+    assert Counter(math.isfinite(flow.extent.x_lo) for flow in flows.values()) == {True: 3, False: 6}
 
 
 def test_extent_of_an_analytic_flow_is_what_the_scenario_says():
@@ -383,6 +463,10 @@ def test_compiled_kernels_give_the_numbers_of_python(flows, evaluator, vortices,
     [
         (lambda: Rankine(0.0, 0.0, 0.0, 1.0), "`flow.radius` must be above 0; got 0"),
         (lambda: Jet(0.0, -3.0, 1.0), "`flow.width` must be above 0; got -3"),
+        (lambda: TidalJet(0.0, 9.0, 1.0, 0.0), "`flow.period` must be above 0; got 0"),
+        (lambda: TidalJet(0.0, 0.0, 1.0, 9.0), "`flow.width` must be above 0; got 0"),
+        (lambda: Uniform(0.1, 0.0, times=(0.0, 9.0)).kernel(HEIGHTS), "`flow.times` is for a flow that changes"),
+        (lambda: TidalJet(0.0, 9.0, 1.0, 9.0, times=(5.0, 5.0)), r"`flow.times` must rise; got \[5, 5\]"),
         (lambda: Vortices(()), "at least one vortex"),
         (lambda: Vortex(0.0, 0.0, 10.0, 1.0, 0.0, 0.0), "`flow.vortex.thickness` must be above 0"),
         (lambda: DoubleGyre(amplitude=1.0, length=1.0, epsilon=0.5, period=1.0), r"`flow.epsilon`.*got 0.5"),

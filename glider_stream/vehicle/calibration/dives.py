@@ -1,8 +1,6 @@
 """Recorded dives from a CSV file."""
 
-import csv
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...base.untrusted import check_file
+from ...base.table import find_columns, read_table
 
 COLUMNS = {
     "vertical": (
@@ -40,7 +38,7 @@ COLUMNS = {
     "phase": ("phase",),
 }
 """The names of columns: speeds through water [m/s], angles [degrees], buoyancy off neutral [cc] or [kg]."""
-MOST_TEXT, MOST_DIVES = 20_000_000, 5_000
+MOST_DIVES = 5_000
 LARGEST = 1e6
 LIMITS = {
     **{"vertical": (-10.0, 10.0), "horizontal": (0.0, 10.0)},
@@ -80,8 +78,8 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
     other phase.
     """
     path = Path(file)
-    header, rows = read_table(path)
-    found = find_columns(path.name, header, columns or {}, COLUMNS)
+    header, rows = read_table(path, "the file of dives", "dive", MOST_DIVES)
+    found = find_columns(path.name, header, COLUMNS, columns or {})
     listed = f"; it has: {', '.join(header)}"
     require("vertical" in found, f"{path.name} has no column of vertical speeds; name it by `vertical`{listed}")
     given = {"horizontal", "pitch", "glide_angle"} & set(found)
@@ -126,62 +124,6 @@ def read_dives(file: str | Path, columns: Mapping[str, str] | None = None) -> Di
         took=found,
         unused=tuple(column for column in header if column not in found.values()),
     )
-
-
-def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the header of a CSV file of dives, and its rows with their line numbers."""
-    check_file(path, "the file of dives")
-    require(path.is_file(), f"the file of dives {path} does not exist; give a CSV file")
-    size = path.stat().st_size
-    require(size <= MOST_TEXT, f"{path.name} holds {size:,} bytes, more than {MOST_TEXT:,}; cut it")
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as text:
-            first = text.readline()
-            # spreadsheets in some countries write semicolons
-            delimiter = max(",;\t", key=first.count)
-            text.seek(0)
-            reader = csv.reader(text, delimiter=delimiter)
-            header = [name.strip() for name in next(reader, [])]
-            rows = list(_rows(reader, path.name, len(header)))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path.name} cannot be read as CSV: {error}; save it as such") from None
-    require(len(rows) > 0, f"{path.name} must hold a header and one line for each dive; got no line")
-    for name, times in Counter(header).items():
-        require(times == 1, f"{path.name} has more than one column `{name}`; rename one")
-    return header, rows
-
-
-def _rows(reader: Iterator[list[str]], name: str, width: int) -> Iterator[tuple[int, list[str]]]:
-    count = 0
-    for row in reader:
-        if not any(cell.strip() for cell in row):
-            continue
-        line = getattr(reader, "line_num", 0)
-        fits = len(row) == width
-        require(fits, f"line {line} of {name} has {len(row)} cells, but the header has {width}; mend it")
-        count += 1
-        require(count <= MOST_DIVES, f"{name} must hold at most {MOST_DIVES:,} dives; got more: cut it")
-        yield line, row
-
-
-def find_columns(
-    name: str, header: Sequence[str], columns: Mapping[str, str], known: Mapping[str, Sequence[str]]
-) -> dict[str, str]:
-    """Return the column in the file for each value of `known` that it has.
-
-    `columns` names columns that have other names than the usual ones in `known`.
-    """
-    for what, column in columns.items():
-        require(what in known, f"`{what}` is not known; choose from: {', '.join(known)}")
-        require(column in header, f"{name} has no column `{column}`; it has: {', '.join(header)}")
-    found = dict(columns)
-    for what, usual in known.items():
-        here = [column for column in header if column.lower() in usual and column not in columns.values()]
-        if what not in found and here:
-            message = f"{name} has more than one column for `{what}`: {', '.join(here)}; name one of them"
-            require(len(here) == 1, message)
-            found[what] = here[0]
-    return found
 
 
 def _numbers(

@@ -1,6 +1,7 @@
 """Reads ocean files of any convention and makes the currents that the kernels read."""
 
 from .divergence import divergence_ratio
+from .ensemble import read_members
 from .file import OceanFile, parse_time
 from .flow import grid_flow, ocean_flow, sample
 from .grid import CurvedGrid, LonLatGrid, index_map
@@ -20,5 +21,6 @@ __all__ = [
     "ocean_flow",
     "parse_time",
     "read_currents",
+    "read_members",
     "sample",
 ]

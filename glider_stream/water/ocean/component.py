@@ -193,7 +193,11 @@ class Component:
                 choice = self._chosen_member(dim)
             else:
                 raise no_axis(self.at, self.variable, dim)
-        left_out = tuple(f"the dimension `{dim}` of one element is left out" for dim in single)
+        if self.names.member is not None and not choice.picked:
+            choice = self._only_member(single)
+        left_out = tuple(
+            f"the dimension `{dim}` of one element is left out" for dim in single if dim not in choice.picked
+        )
         return clock, axes, single, _Choice(choice.picked, (*left_out, *choice.description))
 
     def _time_axis(self, horizontal: tuple[str, str]) -> tuple[str, str] | None:
@@ -205,22 +209,53 @@ class Component:
         return None
 
     def _is_ensemble(self, dim: str) -> bool:
-        known = dim in self.at.data.variables and standard_name(self.at.data[dim]) == "realization"
-        return known or ENSEMBLE.match(dim) is not None or self.names.member is not None
+        return self._is_realization(dim) or ENSEMBLE.match(dim) is not None or self.names.member is not None
+
+    def _only_member(self, single: list[str]) -> "_Choice":
+        """Return the only member of a file, if the user names it; InputError if he names another."""
+        dim = next((dim for dim in single if ENSEMBLE.match(dim) or self._is_realization(dim)), None)
+        if dim is not None:
+            return self._chosen_member(dim)
+        label = next((name for name in map(str, self.at.data.variables) if self._labels_one(name)), None)
+        held = None if label is None else str(self.at.data[label].values.ravel()[0])
+        has = "no members" if held is None else f"member {held} alone"
+        require(
+            held is not None and held == str(self.names.member),
+            f"{self.file} holds {has}, but `member` = {self.names.member!r}: leave `member` out, or name a file "
+            "of members",
+        )
+        return _Choice({}, (f"member {held}, the only one of the file",))
+
+    def _labels_one(self, name: str) -> bool:
+        """Return whether a variable is the label of the one member of a file."""
+        return self.at.data[name].size == 1 and (ENSEMBLE.match(name) is not None or self._is_realization(name))
+
+    def _is_realization(self, name: str) -> bool:
+        return name in self.at.data.variables and standard_name(self.at.data[name]) == "realization"
+
+    def member_labels(self) -> list[str]:
+        """Return the labels of the file's members, or an empty list."""
+        for dim in map(str, self.variable.dims):
+            if ENSEMBLE.match(dim) or self._is_realization(dim):
+                return self._labels_of(dim)
+        return []
+
+    def _labels_of(self, dim: str) -> list[str]:
+        """Return the labels of members along a dimension: of its coordinate, else their numbers."""
+        if dim in self.at.data.variables:
+            return [str(label) for label in self.at.data[dim].values.ravel()]
+        return [str(n) for n in range(self.variable.sizes[dim])]
 
     def _chosen_member(self, dim: str) -> "_Choice":
         """Return the index of the ensemble member that the user names: by its label, or from 0 without labels."""
         size, wanted = self.variable.sizes[dim], self.names.member
-        labels = (
-            [str(label) for label in self.at.data[dim].values.ravel()] if dim in self.at.data.variables else []
-        )
-        listed = f", {labels[0]} to {labels[-1]}" if labels else f", 0 to {size - 1}"
+        known = self._labels_of(dim)
+        listed = f", {known[0]} to {known[-1]}"
         require(
             wanted is not None,
             f"`{self.name}` in {self.file} holds {size} members along `{dim}`{listed}: "
-            "set `member` in `names`, such as member=0",
+            f"set `member` in `names`, or `flow.member`, such as {known[0]}",
         )
-        known = labels or [str(n) for n in range(size)]
         require(
             str(wanted) in known,
             f"{self.file} holds no member {wanted!r} along `{dim}`{listed}; name another `member`",

@@ -179,7 +179,11 @@ def _stamped(name: str, times: Times | None, names: Names) -> Times | None:
         )
         return times
     again = times[1:][np.diff(times) <= np.timedelta64(0, "ms")]
-    require(again.size == 0, f"{name}: the time {again[:1]} is given more than once; leave out the overlap")
+    require(
+        again.size == 0,
+        f"{name}: the time {again[:1]} is given more than once; leave out the overlap, or, if "
+        "these files are members of an ensemble, name one of them",
+    )
     steps = np.diff(times)
     if names.stamps == "start":
         return np.asarray(times + np.append(steps, steps[-1]) // 2)
