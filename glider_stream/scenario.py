@@ -291,7 +291,7 @@ def shipped_scenarios() -> dict[str, Path]:
         True
     """
     folder = Path(str(files("glider_stream"))) / "data"
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return {path.stem: path for path in sorted(folder.glob("*.toml"), key=lambda path: path.stem)}
 
 
 def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
