@@ -912,6 +912,64 @@ def bench(
         say("\n".join(["moved beyond both spreads:", *(f"  {line}" for line in moved or ["nothing"])]))
 
 
+@cli.command()
+@click.argument("mission")
+@click.option("--runs", type=int, required=True, help="The number of runs of each policy.")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    type=FILE,
+    help="A file to write: .json (table), .h5 (tracks), .png, .svg, .pdf, .html (plays a run); repeatable.",
+)
+@click.option("--processes", type=int, help="Processes that share the runs; one for each core if not given.")
+@click.option("--scheduler", metavar="ADDRESS", help="Fly on a Dask cluster; local:N for N processes here.")
+@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@click.option("--restart", is_flag=True, help="Discard the runs that a stopped campaign has kept.")
+@click.option("--run", "number", type=int, default=0, show_default=True, help="The run that a page plays.")
+@click.option("--policy", default="replan", show_default=True, help="The policy that a page plays.")
+@JSON
+def simulate(
+    mission: str,
+    runs: int,
+    outputs: tuple[Path, ...],
+    processes: int | None,
+    scheduler: str | None,
+    overrides: tuple[str, ...],
+    restart: bool,
+    number: int,
+    policy: str,
+    as_json: bool,
+) -> None:
+    """Fly MISSION many times, and compare how pilots plan.
+
+    MISSION is a TOML file or the name of a shipped mission, such as box: a vehicle with errors flies in a true
+    current that differs from the forecast. Runs are kept beside the first output until all are done: the same
+    command continues a stopped campaign. --set takes keys of the mission and of its scenario.
+    """
+    from . import planner
+    from .base.cores import usable_cores
+    from .base.progress import reporter
+
+    with reporter("simulate") as progress:
+        campaign = planner.simulate(
+            mission,
+            runs,
+            outputs,
+            overrides=overrides,
+            processes=usable_cores() if processes is None else processes,
+            scheduler=scheduler,
+            restart=restart,
+            show=(number, policy),
+            progress=progress,
+        )
+    if as_json:
+        _write_json(campaign.as_dict())
+    else:
+        say("\n".join([str(campaign), *(f"  file: {output}" for output in outputs)]))
+
+
 def main() -> None:
     """Run the command line.
 

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from .evaluation import bench as benchmarks
     from .evaluation.level_set import Bound
     from .evaluation.suite import Report
+    from .mission.campaign import Campaign
+    from .mission.settings import Mission
     from .pilot.currents import DiveCurrents
     from .roadmap.verify import Verification
     from .vehicle.calibration.result import Calibration
@@ -793,3 +795,46 @@ def suite(
         for name in report.references:
             (File(ompl) / f"{name}.log").write_text(ompl_log(report, name))
     return report
+
+
+def simulate(
+    mission: "str | File | Mission",
+    runs: int,
+    outputs: Sequence[str | File] = (),
+    *,
+    overrides: Sequence[str] = (),
+    processes: int = 1,
+    scheduler: str | None = None,
+    restart: bool = False,
+    show: tuple[int, str] = (0, "replan"),
+    progress: "Callable[[Any], None]" = lambda progress: None,
+) -> "Campaign":
+    """Fly many runs of a mission (a file, a shipped name or an object), and write them to each of `outputs`.
+
+    An output ends in .json (table and runs), .h5 (tracks), .png, .svg or .pdf (figure), or .html (a page that
+    plays the run and policy that `show` names). With an output, runs are kept beside the first one until all are
+    done: the same call continues a stopped campaign, unless it must `restart`. Runs are shared by `processes` of
+    this machine, or by the workers of a Dask `scheduler`; neither changes a bit. A script that asks for several
+    processes needs `if __name__ == "__main__":` around the call.
+
+    Examples:
+        >>> campaign = planner.simulate("small-mission.toml", 2)
+        >>> [row.arrived.value for row in campaign.rows if row.policy == "replan"]
+        [1.0]
+    """
+    from .mission.campaign import forget
+    from .mission.campaign import simulate as fly
+    from .mission.settings import Mission, read_mission
+    from .simulated import check_outputs, write_campaign
+
+    given = isinstance(mission, Mission)
+    require(not (given and overrides), f"overrides are for a mission that is read; got {list(overrides)}")
+    resolved = mission if isinstance(mission, Mission) else read_mission(mission, overrides)
+    check_outputs(outputs, resolved, runs, show)
+    keep = File(outputs[0]) if outputs else None
+    job: dict[str, Any] = {"processes": processes, "address": scheduler, "restart": restart, "progress": progress}
+    campaign = fly(resolved, runs, keep=keep, **job)
+    write_campaign(campaign, outputs, show)
+    if keep is not None:
+        forget(keep)
+    return campaign

@@ -291,7 +291,7 @@ def shipped_scenarios() -> dict[str, Path]:
         True
     """
     folder = Path(str(files("glider_stream"))) / "data"
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return {path.stem: path for path in sorted(folder.glob("*.toml"), key=lambda path: path.stem)}
 
 
 def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
@@ -314,19 +314,25 @@ def read_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         path.is_file(),
         f"the scenario {name} is neither a file nor a shipped scenario; choose a file, or one of: {shipped}",
     )
+    table = read_table(path, f"the scenario {name}")
+    _override(table, overrides)
+    check_depth(table, "`--set`")
+    return scenario_from_table(table, path.parent)
+
+
+def read_table(path: Path, what: str) -> dict[str, Any]:
+    """Return the table of a TOML file; `what` names the file in the sentence of an InputError."""
     try:
         # some editors write a byte order mark at the start
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise InputError(f"the scenario {name} cannot be read: {error.strerror}; name another") from None
+        raise InputError(f"{what} cannot be read: {error.strerror}; name another") from None
     except UnicodeDecodeError as error:
-        raise InputError(f"the scenario {name} is not UTF-8 text ({error}); save it as UTF-8") from None
+        raise InputError(f"{what} is not UTF-8 text ({error}); save it as UTF-8") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"the scenario {name} is not valid TOML: {error}; mend this place") from None
-    check_depth(table, f"the scenario {name}")
-    _override(table, overrides)
-    check_depth(table, "`--set`")
-    return scenario_from_table(table, path.parent)
+        raise InputError(f"{what} is not valid TOML: {error}; mend this place") from None
+    check_depth(table, what)
+    return table
 
 
 def scenario_from_text(
@@ -374,7 +380,7 @@ def scenario_of(road: Roadmap | SlicedRoadmap) -> Scenario:
         place = override.partition("=")[0].strip()
         choices = " or ".join(names) or "which has none"
         require(place in names, f"`--set` names a file of the roadmap's scenario, {choices}; got {override!r}")
-        _set(table, override)
+        set_key(table, override)
         section, key = place.split(".")
         table[section] |= _located({key: table[section][key]}, Path())
         given[place] = names_of(table)[place]
@@ -437,7 +443,7 @@ def _located(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 def _override(table: dict[str, Any], overrides: Sequence[str]) -> None:
     """Set each section.key=value, and drop the keys of kinds that are no longer chosen."""
     before = {section: _kind_keys(table, section) for section in KINDS}
-    given = [_set(table, override) for override in overrides]
+    given = [set_key(table, override) for override in overrides]
     for section, key in (place for place in given if len(place) == 2 and place[1] in FILES):
         table[section] |= _located({key: table[section][key]}, Path())
     for section, keys in before.items():
@@ -455,7 +461,7 @@ def _kind_keys(table: Mapping[str, Any], section: str) -> set[str]:
     return {field.name for field in fields(kind) if field.init} if kind else set()
 
 
-def _set(table: dict[str, Any], override: str) -> list[str]:
+def set_key(table: dict[str, Any], override: str) -> list[str]:
     """Set a value, which is TOML or else a plain text, and return its place."""
     place, equals, text = override.partition("=")
     keys = [key.strip() for key in place.split(".")]

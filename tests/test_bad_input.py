@@ -77,7 +77,7 @@ SCENARIOS = {
         "`integration.step`",
         "choose from: dt, steps, tolerance",
     ),
-    "unknown key of a vortex": ("y = -30.0", "y = -30.0\nz = 1.0", "vortex.z`", "choose from: depth, radius"),
+    "unknown key of a vortex": ("y = -30.0", "y = -30.0\nz = 1.0", "vortex.z`", "from: depth, drift, radius"),
     "unknown flow": ('"vortices"', '"whirl"', "'whirl'", "choose from: double-gyre"),
     "a kind that is a number": ('"vortices"', "7", "= 7 is not known", "choose from"),
     "a kind that is a list": ('"nearest"', '["nearest"]', "['nearest']", "choose from"),

@@ -7,6 +7,7 @@ import pathlib
 import numpy as np
 import pytest
 from helpers.ionian import write_ionian
+from helpers.missions import write_mission
 from helpers.small import SCENARIO, roadmap
 
 import glider_stream
@@ -58,6 +59,7 @@ def folder(tmp_path_factory):
     (made / "small.toml").write_text(SCENARIO)
     write_roadmap(roadmap(), made / "small.h5")
     write_ionian(made / "currents.nc")
+    write_mission(made)
     (made / "dives.csv").write_text(DIVES)
     return made
 

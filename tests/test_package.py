@@ -84,6 +84,7 @@ def test_the_wheel_is_whole(tmp_path):
     held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     folders = {"glider_stream/kernels": "kernels", "glider_stream/data": "data"}
     wanted = {f"{inside}/{p.name}" for inside, at in folders.items() for p in (ROOT / at).glob("*.[pt][yo]*")}
+    wanted |= {f"glider_stream/data/missions/{p.name}" for p in (ROOT / "data" / "missions").glob("*.toml")}
     wanted |= {str(p.relative_to(ROOT)) for p in (ROOT / "glider_stream").glob("**/*.py")}
     wanted |= {str(p.relative_to(ROOT)) for p in (ROOT / "glider_stream" / "plot").glob("page*.[hcj]*")}
     assert held == wanted | {"glider_stream/py.typed", "glider_stream/data/references.json"}

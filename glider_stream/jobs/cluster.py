@@ -7,10 +7,10 @@ import math
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from ..roadmap.builder import find_edges, nodes_of_batch, warm_up
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Edges
 
+Given = TypeVar("Given")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 AHEAD = 4
 """This many chunks wait at the scheduler for each thread of a worker."""
 TRIES = 10
@@ -124,8 +127,27 @@ class Cluster:
 
         Chunks of a lost worker are done again.
         """
+        yield from self._guarded(self._evaluated(problem, position, source, batch_pairs))
+
+    def _evaluated(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
+        # degrees are computed here, so that the frame need not be sent
+        work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
+        size = nodes_of_batch(problem, problem.legs(position), batch_pairs)
+        yield from self._each(evaluate, work, np.array_split(source, range(size, len(source), size)))
+
+    def each(
+        self, function: Callable[[Given, Item], Result], work: Given, items: Iterable[Item]
+    ) -> Iterator[Result]:
+        """Yield `function(work, item)` of all items, from the workers, in the order in which they are done.
+
+        Items of a lost worker are done again. InputError if the cluster fails.
+        """
+        yield from self._guarded(self._each(function, work, items))
+
+    def _guarded(self, results: Iterator[Result]) -> Iterator[Result]:
+        """Yield results; an error of the cluster becomes an InputError."""
         try:
-            yield from self._evaluated(problem, position, source, batch_pairs)
+            yield from results
         except InputError:
             raise
         except Exception as error:
@@ -135,21 +157,20 @@ class Cluster:
                 f"the cluster failed: {reason}; give the same command to continue, here or with another scheduler"
             ) from None
 
-    def _evaluated(self, problem: Problem, position: Array, source: Index, batch_pairs: int) -> Iterator[Edges]:
+    def _each(
+        self, function: Callable[[Given, Item], Result], work: Given, items: Iterable[Item]
+    ) -> Iterator[Result]:
         self.client.wait_for_workers(1, timeout=WAIT)
-        # degrees are computed here, so that the frame need not be sent
-        work = Work(replace(problem, to_lonlat=None), position, self.threads, software())
         sent = self.client.scatter(work, broadcast=True, hash=False)
-        size = nodes_of_batch(problem, problem.legs(position), batch_pairs)
-        chunks = iter(np.array_split(source, range(size, len(source), size)))
+        left = iter(items)
         waiting = _distributed().as_completed()
         counted, room = -math.inf, 0
         while True:
             if time.monotonic() - counted >= COUNT_AGAIN:
                 # a worker that joins late gets its share
                 counted, room = time.monotonic(), AHEAD * max(1, sum(self.client.nthreads().values()))
-            for chunk in itertools.islice(chunks, max(0, room - waiting.count())):
-                waiting.add(self.client.submit(evaluate, sent, chunk, pure=False, retries=TRIES))
+            for item in itertools.islice(left, max(0, room - waiting.count())):
+                waiting.add(self.client.submit(function, sent, item, pure=False, retries=TRIES))
             if waiting.is_empty():
                 return
             yield next(waiting).result()

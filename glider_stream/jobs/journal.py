@@ -1,4 +1,4 @@
-"""The journal of a build: keeps what was found, safe from the end of the process, until the roadmap is whole."""
+"""Journals: keep what a job has found, safe from the end of the process, until its output is whole."""
 
 import hashlib
 import json
@@ -6,10 +6,11 @@ import os
 import stat
 import struct
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ..base.errors import InputError
 from ..base.settings import require
 from ..roadmap.roadmap import EMPTY, Edges
 
-MAGIC = b"glider-stream/journal 1\n"
+T = TypeVar("T")
 RECORD = struct.Struct("<4sQQd")
 """The head of a record: mark, number of nodes, number of edges, seconds.
 
@@ -36,23 +37,21 @@ def _sizes(nodes: int, edges: int) -> list[tuple[tuple[int, ...], np.dtype[Any]]
     return [((n, *shape), np.dtype(kind)) for n, (shape, kind) in zip(count, EMPTY, strict=True)]
 
 
-class Journal:
-    """Records of `Edges`, each written whole or not at all; `done` tells which nodes they hold.
+class Records(ABC, Generic[T]):
+    """A file of records, each written whole or not at all.
 
     An unfinished record that a kill leaves is cut off. `every` [s]: how often the disk is asked to keep what was
     written, against a loss of power. If only the process is lost, nothing written is lost.
     """
 
-    def __init__(
-        self, path: Path, identity: Mapping[str, Any], nodes: Index, restart: bool, every: float
-    ) -> None:
-        """Continue the journal at `path`, or begin it; InputError if it belongs to another build.
+    magic: ClassVar[bytes]
+    """The first line of the file."""
+    job: ClassVar[str]
+    """The kind of job, for messages."""
 
-        `nodes`, rising: the nodes that records may hold, each once.
-        """
+    def __init__(self, path: Path, identity: Mapping[str, Any], restart: bool, every: float) -> None:
+        """Continue the journal at `path`, or begin it; InputError if it belongs to another job."""
         self.path, self.every = path, every
-        self.done = np.zeros(int(nodes[-1]) + 1 if nodes.size else 0, dtype=bool)
-        self._nodes = nodes
         self._places: list[tuple[int, int]] = []
         self._file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | BINARY, 0o666), "r+b", buffering=0)
         self._end, self._mine = 0, False
@@ -63,8 +62,28 @@ class Journal:
             self.__exit__(type(error), error, None)
             raise
 
+    @abstractmethod
+    def _read(self, place: int, size: int) -> tuple[T, int] | None:
+        """Return the record at a position and its length; None if it is cut short or damaged."""
+
+    @abstractmethod
+    def _is_new(self, record: T) -> bool:
+        """Return whether a record belongs to this job and repeats no earlier one."""
+
+    @abstractmethod
+    def _note(self, record: T) -> None:
+        """Note what a record holds."""
+
+    @abstractmethod
+    def _rank(self, record: T) -> int:
+        """Return the number by which records are sorted."""
+
+    @abstractmethod
+    def _bytes(self, record: T) -> bytes:
+        """Return a record as it is written."""
+
     def _begin(self, identity: Mapping[str, Any], restart: bool) -> None:
-        header = MAGIC + json.dumps(identity, sort_keys=True).encode() + b"\n"
+        header = self.magic + json.dumps(identity, sort_keys=True).encode() + b"\n"
         if not self._resumes(identity, restart):
             self._file.truncate(0)
             self._mine = True
@@ -74,7 +93,7 @@ class Journal:
             self._note(record)
         self._file.truncate(self._end)
 
-    def __enter__(self) -> "Journal":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -92,15 +111,15 @@ class Journal:
             self._file.close()
 
     def _resumes(self, identity: Mapping[str, Any], restart: bool) -> bool:
-        """Return whether to continue a journal of the same build; its records begin at `_end`."""
-        in_the_way = f"{self.path} has the name of this build's journal but is not a journal; move it away"
+        """Return whether to continue a journal of the same job; its records begin at `_end`."""
+        in_the_way = f"{self.path} has the name of this {self.job}'s journal but is not a journal; move it away"
         require(stat.S_ISREG(os.fstat(self._file.fileno()).st_mode), in_the_way)
         self._file.seek(0)
         head = self._file.read(LONGEST_HEADER)
-        line = head[len(MAGIC) :].split(b"\n", 1)
-        # a build that was killed at its first write leaves a part of the header
-        require(head.startswith(MAGIC) or MAGIC.startswith(head), in_the_way)
-        if restart or not head.startswith(MAGIC) or len(line) < 2:
+        line = head[len(self.magic) :].split(b"\n", 1)
+        # a job that was killed at its first write leaves a part of the header
+        require(head.startswith(self.magic) or self.magic.startswith(head), in_the_way)
+        if restart or not head.startswith(self.magic) or len(line) < 2:
             return False
         try:
             header = json.loads(line[0])
@@ -109,25 +128,77 @@ class Journal:
         if not isinstance(header, dict) or header != dict(identity):
             keys = sorted(key for key in {*identity, *header} if dict(header).get(key) != identity.get(key))
             raise InputError(
-                f"{self.path} keeps the progress of another build, whose {', '.join(keys)} differ; "
-                "finish that build with its own command, or start again with --restart"
+                f"{self.path} keeps the progress of another {self.job}, whose {', '.join(keys)} differ; "
+                f"finish that {self.job} with its own command, or start again with --restart"
             )
-        self._end = len(MAGIC) + len(line[0]) + 1
+        self._end = len(self.magic) + len(line[0]) + 1
         return True
 
-    def _scan(self) -> Iterator[Edges]:
+    def _scan(self) -> Iterator[T]:
         """Yield the whole records from `_end` on, and move `_end` past each."""
         size = os.fstat(self._file.fileno()).st_size
         while self._end < size:
-            record = self._read(self._end, size)
-            if record is None:
+            found = self._read(self._end, size)
+            if found is None:
                 return
-            edges, length = record
-            if not self._is_new(edges):
+            record, length = found
+            if not self._is_new(record):
                 return
-            self._places.append((int(edges.source[0]), self._end))
+            self._places.append((self._rank(record), self._end))
             self._end += length
-            yield edges
+            yield record
+
+    def _write(self, whole: bytes) -> None:
+        """Append the bytes, or leave the file unchanged."""
+        self._file.seek(self._end)
+        try:
+            written = 0
+            while written < len(whole):
+                written += self._file.write(whole[written:]) or 0
+        except OSError:
+            self._file.truncate(self._end)
+            raise
+        self._end += len(whole)
+
+    def append(self, record: T) -> None:
+        """Keep a record."""
+        place = self._end
+        self._write(self._bytes(record))
+        self._places.append((self._rank(record), place))
+        self._note(record)
+        if time.monotonic() - self._synced >= self.every:
+            os.fsync(self._file.fileno())
+            self._synced = time.monotonic()
+
+    def records(self) -> Iterator[T]:
+        """Yield all records in their order."""
+        for _, place in sorted(self._places):
+            record = self._read(place, self._end)
+            if record is None:
+                raise InputError(f"{self.path} was damaged while it was in use; start again with --restart")
+            yield record[0]
+
+    def remove(self) -> None:
+        """Remove the journal; the output is whole."""
+        self.path.unlink(missing_ok=True)
+
+
+class Journal(Records[Edges]):
+    """The records of a build: `Edges`; `done` tells which nodes they hold."""
+
+    magic = b"glider-stream/journal 1\n"
+    job = "build"
+
+    def __init__(
+        self, path: Path, identity: Mapping[str, Any], nodes: Index, restart: bool, every: float
+    ) -> None:
+        """Continue the journal at `path`, or begin it; InputError if it belongs to another build.
+
+        `nodes`, rising: the nodes that records may hold, each once.
+        """
+        self.done = np.zeros(int(nodes[-1]) + 1 if nodes.size else 0, dtype=bool)
+        self._nodes = nodes
+        super().__init__(path, identity, restart, every)
 
     def _read(self, place: int, size: int) -> tuple[Edges, int] | None:
         """Return the record at a position and its length; None if it is cut short or damaged."""
@@ -164,20 +235,10 @@ class Journal:
     def _note(self, edges: Edges) -> None:
         self.done[edges.source] = True
 
-    def _write(self, whole: bytes) -> None:
-        """Append the bytes, or leave the file unchanged."""
-        self._file.seek(self._end)
-        try:
-            written = 0
-            while written < len(whole):
-                written += self._file.write(whole[written:]) or 0
-        except OSError:
-            self._file.truncate(self._end)
-            raise
-        self._end += len(whole)
+    def _rank(self, edges: Edges) -> int:
+        return int(edges.source[0])
 
-    def append(self, edges: Edges) -> None:
-        """Keep the edges of these nodes."""
+    def _bytes(self, edges: Edges) -> bytes:
         head = RECORD.pack(MARK, edges.source.size, edges.target.size, edges.seconds)
         sizes = _sizes(edges.source.size, edges.target.size)
         arrays = edges.source, edges.degree, edges.target, edges.values, edges.counts
@@ -185,22 +246,4 @@ class Journal:
         body = b"".join(
             np.ascontiguousarray(array, kind).tobytes() for array, kind in zip(arrays, kinds, strict=True)
         )
-        place = self._end
-        self._write(head + body + hashlib.blake2b(head + body, digest_size=DIGEST).digest())
-        self._places.append((int(edges.source[0]), place))
-        self._note(edges)
-        if time.monotonic() - self._synced >= self.every:
-            os.fsync(self._file.fileno())
-            self._synced = time.monotonic()
-
-    def records(self) -> Iterator[Edges]:
-        """Yield all records in the order of their first nodes."""
-        for _, place in sorted(self._places):
-            record = self._read(place, self._end)
-            if record is None:
-                raise InputError(f"{self.path} was damaged while it was in use; start again with --restart")
-            yield record[0]
-
-    def remove(self) -> None:
-        """Remove the journal; the roadmap is complete."""
-        self.path.unlink(missing_ok=True)
+        return head + body + hashlib.blake2b(head + body, digest_size=DIGEST).digest()

@@ -212,6 +212,16 @@ legs.forEach((leg, n) => {
 });
 at("stops").setAttribute("d", legs.slice(1).map((leg) => `M${leg.x[0]} ${leg.y[0]}h0`).join(""));
 
+// the plan that holds at the chosen time: dashed, and only where a run is played
+let shownPlan = -1;
+const placePlan = () => {
+  if (!data.plans.length) return;
+  const n = lastBelow(data.plans.map((plan) => plan.t), chosen.time), { x, y } = data.plans[n];
+  if (n === shownPlan) return;
+  shownPlan = n;
+  at("plan").setAttribute("d", x.map((east, i) => `${i ? "L" : "M"}${east} ${y[i]}`).join(""));
+};
+
 const draw = () => {
   const ratio = window.devicePixelRatio || 1, { width, height, scale } = view;
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);

@@ -7,7 +7,7 @@ const describe = (list, rows) =>
     return [term, said];
   }));
 const bearing = (u, v) => ((Math.atan2(u, v) * 180) / Math.PI + 360) % 360;
-const kind = (leg) => (leg.glide > 0 ? "climb" : "dive");
+const kind = (leg) => (leg.glide > 0 ? "climb" : leg.glide < 0 ? "dive" : "drift");
 const metres = (value) => (value === null ? null : `${value.toFixed(0)} m`);
 const ends = (leg) => [leg.depth[0], leg.depth[leg.depth.length - 1]];
 
@@ -17,8 +17,8 @@ const chooseLeg = (n) => {
   const leg = legs[n], [u, v] = leg.current, [from, to] = ends(leg);
   at("leg-title").textContent = `Leg ${n + 1} of ${legs.length}: ${kind(leg)}`;
   describe(at("leg"), [
-    ["Heading", `${leg.heading.toFixed(1)}°`],
-    ["Glide angle", `${leg.glide.toFixed(1)}°`],
+    ["Heading", leg.glide ? `${leg.heading.toFixed(1)}°` : null],
+    ["Glide angle", leg.glide ? `${leg.glide.toFixed(1)}°` : null],
     ["Depths", `${from.toFixed(0)} to ${to.toFixed(0)} m`],
     ["Departs", momentName(leg.depart)],
     ["Arrives", momentName(leg.depart + leg.duration)],
@@ -26,7 +26,7 @@ const chooseLeg = (n) => {
     ["Through water", `${leg.speed.toFixed(3)} m/s`],
     ["Over ground", leg.ground === null ? null : `${leg.ground.toFixed(3)} m/s`],
     ["Mean current", u === null ? null : `${Math.hypot(u, v).toFixed(3)} m/s to ${bearing(u, v).toFixed(0)}°`],
-    ["Misses by", `${leg.miss.toFixed(2)} m`],
+    ["Misses by", leg.miss === null ? null : `${leg.miss.toFixed(2)} m`],
   ]);
   for (const { made, leg: mine } of pieces) made.classList.toggle("chosen", mine === n);
   profilePieces.forEach((made, k) => made.classList.toggle("chosen", pieces[k].leg === n));
@@ -39,6 +39,7 @@ const chooseTime = (time) => {
   chooseLeg(here.leg);
   if (data.current.times.length > 1) { paint(); redraw(); }
   placeMarks();
+  placePlan();
   markProfile();
   at("time").value = (1000 * chosen.time) / total;
   at("time").setAttribute("aria-valuetext", momentName(chosen.time));
@@ -50,6 +51,30 @@ const chooseTime = (time) => {
     ["Depth", metres(here.depth)],
     ["Seabed", metres(here.seabed)],
   ]);
+};
+// the whole of it plays in some seconds; any touch of time, map or profile stops it
+const PLAYED = 24;
+let playing = null;
+const stop = () => {
+  playing = null;
+  at("play").textContent = "\u25B6";
+  at("play").setAttribute("aria-pressed", "false");
+  at("play").setAttribute("aria-label", "Play");
+};
+const play = (now) => {
+  if (!playing) return;
+  if (playing.before !== null) chooseTime(chosen.time + ((now - playing.before) / 1000 / PLAYED) * total);
+  playing.before = now;
+  if (chosen.time >= total) stop(); else requestAnimationFrame(play);
+};
+const startOrStop = () => {
+  if (playing) return stop();
+  if (chosen.time >= total) chooseTime(0);
+  playing = { before: null };
+  at("play").textContent = "\u25A0";
+  at("play").setAttribute("aria-pressed", "true");
+  at("play").setAttribute("aria-label", "Stop");
+  requestAnimationFrame(play);
 };
 const chooseLegAt = (n) => chooseTime(n <= 0 ? 0 : legs[Math.min(n, legs.length - 1)].depart + 1e-3);
 
@@ -90,9 +115,11 @@ if (fronts) {
   for (const hours of choices) at("fronts").add(new Option(hours ? `${+hours.toFixed(4)} h` : "none", hours));
   at("fronts").addEventListener("change", () => { chosen.every = +at("fronts").value; traceFronts(); redraw(); });
 }
-at("time").addEventListener("input", () => chooseTime((at("time").value / 1000) * total));
-at("earlier").addEventListener("click", () => chooseLegAt(chosen.leg - 1));
-at("later").addEventListener("click", () => chooseLegAt(chosen.leg + 1));
+at("plan-key").hidden = !data.plans.length;
+at("play").addEventListener("click", startOrStop);
+at("time").addEventListener("input", () => { stop(); chooseTime((at("time").value / 1000) * total); });
+at("earlier").addEventListener("click", () => { stop(); chooseLegAt(chosen.leg - 1); });
+at("later").addEventListener("click", () => { stop(); chooseLegAt(chosen.leg + 1); });
 at("theme").addEventListener("click", () => dress(!isDark()));
 at("closer").addEventListener("click", () => zoom(1.6));
 at("farther").addEventListener("click", () => zoom(1 / 1.6));
@@ -105,7 +132,7 @@ legs.forEach((leg, n) => {
   const row = body.insertRow(), [from, to] = ends(leg);
   const cells = [
     n + 1, kind(leg), momentName(leg.depart), momentName(leg.depart + leg.duration), metres(from), metres(to),
-    `${leg.heading.toFixed(1)}°`, `${leg.glide.toFixed(1)}°`, leg.ground === null ? "" : `${leg.ground.toFixed(2)} m/s`,
+    leg.glide ? `${leg.heading.toFixed(1)}°` : "", leg.glide ? `${leg.glide.toFixed(1)}°` : "", leg.ground === null ? "" : `${leg.ground.toFixed(2)} m/s`,
     placeName(leg.x[leg.x.length - 1], leg.y[leg.y.length - 1]),
   ];
   for (const cell of cells) row.insertCell().textContent = cell;
@@ -132,7 +159,7 @@ map.addEventListener("pointermove", (event) => {
   if (!before) {
     const time = event.pointerType === "touch" || event.target.closest("#zoom") ? null : nearest(px, py, 12);
     map.classList.toggle("near", time !== null);
-    if (time !== null) chooseTime(time);
+    if (time !== null && !playing) chooseTime(time);
     return;
   }
   travelled += Math.hypot(px - before[0], py - before[1]);
@@ -149,7 +176,7 @@ const release = (event) => {
   if (!held.size) {
     map.classList.remove("held");
     const time = event.type === "pointerup" && !pulled && travelled < 8 ? nearest(...spot(event), 32) : null;
-    if (time !== null) chooseTime(time);
+    if (time !== null) { stop(); chooseTime(time); }
     pulled = 0;
   }
 };
@@ -169,7 +196,11 @@ map.addEventListener("keydown", (event) => {
   KEYS[event.key]();
 });
 for (const name of ["pointerdown", "pointermove"])
-  profile.addEventListener(name, (event) => chooseTime(profileTime(event)));
+  profile.addEventListener(name, (event) => {
+    if (name === "pointermove" && playing) return;
+    stop();
+    chooseTime(profileTime(event));
+  });
 
 traceFronts();
 const wanted = window.matchMedia("(prefers-color-scheme: dark)");

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,18 @@ AT_SLIDER = ", at the time of the slider"
 MOST_ROWS = 20_000
 """The most rows of a trajectory; a longer one is thinned, and its ends are kept."""
 FEWEST = 4  # rows of a leg
+MOST_OF_PLAN = 400
+"""The most points of a plan's line."""
+
+
+class Replay(NamedTuple):
+    """What a page shows of a flown run besides its path: a sentence, and the plans.
+
+    `plans`: the time [s since departure] at which each plan was made, and its line (n, 2) [m].
+    """
+
+    told: str
+    plans: Sequence[tuple[float, Array]]
 
 
 def save_page(
@@ -54,12 +66,13 @@ def save_page(
     depths: Sequence[float] | None = None,
     fronts: tuple[Fronts, float] | None = None,
     title: str = "",
+    replay: Replay | None = None,
 ) -> None:
     """Write the page of a path that is `placed`; an old file is replaced whole or not at all.
 
     The current is shown at up to four `depths` [m], which `plot_route` chooses from the nodes `position` (n, 3)
-    [m]; `fronts`: the fronts and the hours between them. Of `problem` the box `lo`, `hi` [m], the `departure` [s]
-    and `to_lonlat` are read.
+    [m]; `fronts`: the fronts and the hours between them; `replay`: what else belongs to a flown run. Of `problem`
+    the box `lo`, `hi` [m], the `departure` [s] and `to_lonlat` are read.
     """
     require(len(path.legs) > 0, "a route to draw must have a leg; got a path without any")
     rows = np.asarray(path.trajectory, np.float64)
@@ -80,7 +93,10 @@ def save_page(
         "seabed": _seabed(terrain, frame),
         "legs": _legs(terrain, path),
         "fronts": None if fronts is None else _fronts(*fronts),
+        "plans": [] if replay is None else [_plan(since, line) for since, line in replay.plans],
     }
+    if replay is not None:
+        held["said"] = replay.told
     text = page_text(held, held["title"])
     with replacing(File(file)) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -199,7 +215,7 @@ def _legs(terrain: Terrain, path: "Path") -> list[dict[str, Any]]:
                 "glide": round(math.degrees(leg.glide_angle), 2),
                 "heading": round(leg.compass, 2),
                 "speed": round(leg.speed, 4),
-                "miss": round(leg.miss, 3),
+                "miss": _numbers(np.array([leg.miss]), 3)[0],
                 "ground": _numbers(np.array([over]), 3)[0],
                 "current": _numbers(np.array([u, v]), 4),
             }
@@ -213,6 +229,11 @@ def _means(path: "Path") -> Array:
     sums = [np.bincount(steps.leg, weights=some, minlength=count) for some in (steps.speed, steps.u, steps.v)]
     with np.errstate(invalid="ignore"):
         return np.asarray((np.array(sums) / np.bincount(steps.leg, minlength=count)).T)
+
+
+def _plan(since: float, line: Array) -> dict[str, Any]:
+    kept = line[thinned(len(line), MOST_OF_PLAN)]
+    return {"t": round(since, 1), "x": _numbers(kept[:, 0], 1), "y": _numbers(kept[:, 1], 1)}
 
 
 def _fronts(fronts: Fronts, hours: float) -> dict[str, Any]:

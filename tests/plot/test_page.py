@@ -17,7 +17,7 @@ from helpers.scenes import arrivals, box_scene, ocean_scene
 from helpers.small import strict_json
 
 from glider_stream import plot
-from glider_stream.plot.page import page_text
+from glider_stream.plot.page import Replay, page_text
 
 pytestmark = pytest.mark.slow
 
@@ -35,12 +35,13 @@ OWN = ("google.com", "googleapis.com", "gvt1.com")
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy"[^>]*>')
 
 
-def written(folder, scene, title=TITLE, fronts=6.0, depths=(0.0, 400.0)):
+def written(folder, scene, title=TITLE, fronts=6.0, depths=(0.0, 400.0), replay=None):
     file, every = folder / "page.html", None
     if fronts:
         every = (plot.fronts_of(scene.position, arrivals(scene), scene.terrain), fronts)
     path = plot.placed(scene.path, scene.problem)
-    plot.save_page(file, scene.flow, scene.terrain, scene.problem, scene.position, path, depths, every, title)
+    what = scene.flow, scene.terrain, scene.problem, scene.position, path, depths, every, title
+    plot.save_page(file, *what, replay=replay)
     return file
 
 
@@ -343,3 +344,45 @@ def test_a_phone_shows_it_in_one_column(tmp_path):
     np.testing.assert_allclose(expected(seabed), y[1:-1], atol=0.01)
     np.testing.assert_allclose(np.interp(time, [0.0, time[-1]], [x[1], x[-2]]), x[1:-1], atol=0.01)
     assert expected.deriv()(0.0) > 0
+
+
+PLAY = """<script>
+setTimeout(() => {
+  const said = [], line = () => at("plan").getAttribute("d"), label = () => at("play").getAttribute("aria-label");
+  said.push([chosen.time, label(), line(), getComputedStyle(at("plan-key")).display]);
+  at("play").click();
+  play(1000);
+  play(1000 + 12000);
+  said.push([chosen.time, label(), line()]);
+  at("play").click();
+  play(30000);
+  said.push([chosen.time, label()]);
+  at("play").click();
+  play(1000);
+  play(1000 + 60000);
+  said.push([chosen.time, label()]);
+  const out = document.createElement("pre");
+  out.id = "said";
+  out.textContent = JSON.stringify(said);
+  document.body.append(out);
+}, 300);
+</script>"""
+
+
+@needs_browser
+def test_a_run_plays_with_the_plan_of_its_time(tmp_path):
+    """All of it in 24 seconds; a second touch stops it, and so does its end."""
+    scene = ocean_scene()
+    total = scene.path.travel_time
+    ways = np.array([[0.0, 0.0], [1000.0, 2000.0]]), np.array([[500.0, 0.0], [-700.0, 300.0], [0.0, 100.0]])
+    replay = Replay("run 3, replan: arrived", [(0.0, ways[0]), (0.4 * total, ways[1])])
+    text = written(tmp_path, scene, fronts=None, replay=replay).read_text("utf-8")
+    seen = browse(text.replace("</body>", f"{PLAY}</body>"), tmp_path)
+    assert not seen.console
+    (found,) = re.findall(r'<pre id="said">(.*?)</pre>', seen.dom, re.DOTALL)
+    begin, middle, stopped, end = json.loads(html.unescape(found))
+    assert begin == [0, "Play", "M0 0L1000 2000", "flex"]
+    assert middle == [pytest.approx(total / 2), "Stop", "M500 0L-700 300L0 100"]
+    assert stopped == [middle[0], "Play"]
+    assert end == [pytest.approx(total), "Play"]
+    assert "run 3, replan: arrived" in seen.dom

@@ -230,6 +230,15 @@ kind = "time"
 """
 
 
+def in_a_file(folder):
+    """The scenario with its even current in a file: the kernels of files are compiled for other tests, too."""
+    everywhere = ("depth", "lat", "lon"), np.ones((2, LAT.size, LON.size))
+    even = {name: (everywhere[0], speed * everywhere[1], {"units": "m/s"}) for name, speed in CURRENT.items()}
+    depth = {"depth": ("depth", [0.0, 60.0], {"units": "m", "positive": "down"})}
+    written(folder, chart().assign(even).assign_coords(depth).drop_vars("elevation"), "even.nc")
+    (folder / "sound.toml").write_text(SCENARIO.replace(EVEN, 'kind = "netcdf"\nfile = "even.nc"\n'))
+
+
 def ways_of_all_legs(problem, road, spacing=10.0):
     """All stored legs' places, at most `spacing` metres apart: (n, 3) [m]."""
     source = np.repeat(np.arange(len(road.position)), np.diff(road.indptr))
@@ -253,13 +262,7 @@ def test_no_leg_touches_what_the_files_close(tmp_path, monkeypatch):
     written(tmp_path, chart())
     zone = square(12.515, 55.775, 0.003)
     zones(tmp_path, zone)
-    everywhere = ("depth", "lat", "lon"), np.ones((2, LAT.size, LON.size))
-    even = {name: (everywhere[0], speed * everywhere[1], {"units": "m/s"}) for name, speed in CURRENT.items()}
-    depth = {"depth": ("depth", [0.0, 60.0], {"units": "m", "positive": "down"})}
-    written(tmp_path, chart().assign(even).assign_coords(depth).drop_vars("elevation"), "even.nc")
-    # the kernels of a current file are compiled for other tests, too
-    scenario = SCENARIO.replace(EVEN, 'kind = "netcdf"\nfile = "even.nc"\n')
-    (tmp_path / "sound.toml").write_text(scenario)
+    in_a_file(tmp_path)
     problem = read_scenario("sound.toml").problem()
     road = build_roadmap(problem)
     assert road.target.size > 2000
@@ -282,7 +285,7 @@ def test_a_scenario_speaks_of_its_terrain(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written(tmp_path, chart())
     zones(tmp_path, square(12.55, 55.8))
-    Path("sound.toml").write_text(SCENARIO)
+    in_a_file(tmp_path)
     small = ("--set", "sampling.count=40", "--set", "neighbours.k=5")
     said = command(capsys, "build", "sound.toml", "-o", "road.h5", *small)
     assert said.code == 0

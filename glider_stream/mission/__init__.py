@@ -1,0 +1,1 @@
+"""Missions: a vehicle flies in a true current that differs from the forecast; a pilot plans again and again."""

@@ -1,0 +1,170 @@
+"""A campaign: tracks over the current, who arrives when, a plan against what was flown, times over the best."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..roadmap.problem import Problem
+from ..water.inspect import is_steady
+from .canvas import GREY, INK, frozen, new_figure, styled, time_unit, when_text
+from .scene import draw_current, draw_ends
+from .water import Frame, frame_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LOOKS: dict[str, tuple[str, Any]] = {
+    "replan": ("#d55e00", "-"),
+    "omniscient": (INK, (0, (1, 1))),
+    "open-loop": ("#0072b2", (0, (4, 1.2))),
+    "depth-averaged": ("#009e73", (0, (6, 1, 1, 1))),
+    "straight": ("#cc79a7", (0, (2, 1))),
+}
+"""Colour and line of each policy (Okabe, Ito 2008): they differ in print and for people who see few colours."""
+MOST_TRACKS = 60
+"""So many tracks of each policy are drawn; more would hide the current."""
+
+
+class Flown(Protocol):
+    """A run of a policy: `track` rows [t, x, y, z], `time` [s], its first plan as a `line` (n, 2) [m]."""
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it arrived."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """How long it took [s]."""
+        ...
+
+    @property
+    def track(self) -> Array:
+        """The rows [t, x, y, z]."""
+        ...
+
+    @property
+    def line(self) -> Array:
+        """The first plan (n, 2) [m]."""
+        ...
+
+
+Runs = Mapping[str, Sequence[Flown]]
+
+
+def plot_campaign(problem: Problem, runs: Runs, radius: float, depth: float, title: str) -> "Figure":
+    """Draw the runs of each policy, over the true current at a `depth` [m]; within `radius` [m] a run arrives.
+
+    Of `problem` the true flow and terrain, the box, start and goal, the departure and `to_lonlat` are read.
+    """
+    assert problem.start is not None
+    assert problem.goal is not None
+    with styled():
+        points = [run.track[:, 1:] for flown in runs.values() for run in flown[:MOST_TRACKS]]
+        frame = frame_of(problem, np.vstack(points))
+        count = max(len(flown) for flown in runs.values())
+        figure = new_figure(13.0, 9.4, f"{title}: {count:,} run{'s' * (count != 1)} of each policy")
+        grid = figure.add_gridspec(2, 2, height_ratios=(1.5, 1.0))
+        flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
+        when = when_text(is_steady(flow), problem.departure, problem.departs)
+        maps = [figure.add_subplot(grid[0, n]) for n in range(2)]
+        for ax in maps:
+            image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.45)
+            ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
+            _draw_goal(ax, frame, problem.goal, radius)
+        high = (frame.y[1] - frame.y[0]) / (frame.x[1] - frame.x[0])
+        look: dict[str, Any] = {"aspect": 35 * min(1.0, high), "shrink": min(1.0, 1.05 * high), "pad": 0.02}
+        figure.colorbar(image, ax=maps, label="True current (m/s)", **look)
+        _draw_tracks(maps[0], frame, runs)
+        maps[0].set_title(f"(a) Tracks over the true current at {depth:.4g} m{when}")
+        _draw_plan(maps[1], frame, runs)
+        for ax in maps:
+            draw_ends(ax, frame.scaled(np.stack([problem.start, problem.goal]))[:, :2], 0.7)
+        _draw_arrivals(figure.add_subplot(grid[1, 0]), runs)
+        _draw_ratios(figure.add_subplot(grid[1, 1]), runs)
+        return frozen(figure)
+
+
+def _draw_goal(ax: Any, frame: Frame, goal: Array, radius: float) -> None:
+    from matplotlib.patches import Circle
+
+    middle = frame.scaled(goal)[:2]
+    ax.add_patch(
+        Circle((middle[0], middle[1]), radius / frame.unit, fill=False, edgecolor=INK, linewidth=0.9, zorder=8)
+    )
+
+
+def _draw_tracks(ax: Any, frame: Frame, runs: Runs) -> None:
+    shown = max(len(flown) for flown in runs.values())
+    alpha = float(np.clip(6.0 / shown, 0.12, 0.9))
+    for policy, flown in runs.items():
+        colour, _ = LOOKS[policy]
+        for run in flown[:MOST_TRACKS]:
+            line = frame.scaled(run.track[:, 1:])
+            ax.plot(*line[:, :2].T, color=colour, linewidth=0.9, alpha=alpha, zorder=5)
+        ax.plot([], [], color=colour, linewidth=2.0, label=policy)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=5, frameon=False, fontsize=8)
+
+
+def _draw_plan(ax: Any, frame: Frame, runs: Runs) -> None:
+    """Draw the first plan of run 0, and what was flown, of replanning or else of the first policy."""
+    policy = "replan" if "replan" in runs else next(iter(runs))
+    run, colour = runs[policy][0], LOOKS[policy][0]
+    flown = frame.scaled(run.track[:, 1:])
+    plan = frame.scaled(np.column_stack([run.line, np.zeros(len(run.line))]))
+    for line, look in ((flown, {"color": colour}), (plan, {"color": INK, "linestyle": (0, (4, 2))})):
+        ax.plot(*line[:, :2].T, color="white", linewidth=3.6, zorder=5)
+        ax.plot(*line[:, :2].T, linewidth=1.8, zorder=6, **look)
+    ax.plot([], [], color=INK, linestyle=(0, (4, 2)), label="first plan")
+    ax.plot([], [], color=colour, label="flown")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, frameon=False, fontsize=8)
+    ax.set_title(f"(b) Plan and flown: run 0, {policy}")
+
+
+def _draw_arrivals(ax: Any, runs: Runs) -> None:
+    """Draw the share of all runs that have arrived by each time."""
+    latest = max((run.time for flown in runs.values() for run in flown if run.arrived), default=1.0)
+    unit, name = time_unit(latest)
+    for policy, flown in runs.items():
+        colour, line = LOOKS[policy]
+        times = np.sort([run.time for run in flown if run.arrived]) / unit
+        share = 100.0 * np.arange(times.size + 1) / len(flown)
+        at = np.concatenate([[0.0], times, [1.05 * latest / unit]])
+        ax.step(at, np.append(share, share[-1]), where="post", color=colour, linestyle=line, label=policy)
+    ax.set(xlabel=f"Time since departure ({name})", ylabel="Arrived (% of runs)", ylim=(-2, 104))
+    first = min((run.time for flown in runs.values() for run in flown if run.arrived), default=0.0)
+    ax.set_xlim(max(0.0, first - 0.1 * (latest - first) - 0.02 * latest) / unit, 1.03 * latest / unit)
+    ax.set_title("(c) Who has arrived")
+    ax.grid(color="#e6e6e6", linewidth=0.6)
+    ax.legend(frameon=False, fontsize=8, loc="lower right")
+
+
+def _draw_ratios(ax: Any, runs: Runs) -> None:
+    """Draw the times over those of the omniscient policy, run by run where both arrive."""
+    names = [policy for policy in runs if policy != "omniscient"]
+    if "omniscient" not in runs or not names:
+        ax.set_axis_off()
+        return
+    best = runs["omniscient"]
+    ratios = [
+        [
+            run.time / ideal.time
+            for run, ideal in zip(runs[name], best, strict=True)
+            if run.arrived and ideal.arrived
+        ]
+        for name in names
+    ]
+    look = {"color": INK, "linewidth": 1.2}
+    boxes = ax.boxplot(ratios, orientation="horizontal", widths=0.6, medianprops=look, patch_artist=True)
+    for box, name in zip(boxes["boxes"], names, strict=True):
+        box.set(facecolor=LOOKS[name][0], alpha=0.55)
+    for flier in boxes["fliers"]:
+        flier.set(marker=".", markersize=3, markeredgecolor=GREY)
+    ax.axvline(1.0, color=GREY, linewidth=0.8)
+    ax.set_yticks(
+        range(1, len(names) + 1), [f"{name} ({len(some)})" for name, some in zip(names, ratios, strict=True)]
+    )
+    ax.set(xlabel="Time over the omniscient's (runs in which both arrive)")
+    ax.set_title("(d) How much longer it takes; half of the runs in a box")
