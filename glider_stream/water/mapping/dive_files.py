@@ -170,8 +170,8 @@ class _Columns:
         """Return the texts of a column; InputError without it."""
         require(
             what in self.found,
-            f"{self.name} has no column for `{what}`, such as {' or '.join(self.usual[what][:2])}; name it, or add it; "
-            f"it has: {', '.join(self.header)}",
+            f"{self.name} has no column for `{what}`, such as {' or '.join(self.usual[what][:2])}; name it, "
+            f"or add it; it has: {', '.join(self.header)}",
         )
         at = self.header.index(self.found[what])
         return [row[at] for _, row in self.rows]
