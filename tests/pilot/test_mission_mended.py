@@ -4,13 +4,15 @@ import json
 import math
 
 import pytest
-from helpers.small import command, roadmap
+from helpers.small import SCENARIO, command, roadmap
 
 import glider_stream
 from glider_stream import planner
 from glider_stream.base.errors import InputError
+from glider_stream.opened import open_scenario
 from glider_stream.pilot.currents import dive_currents
 from glider_stream.roadmap.store import write_roadmap
+from glider_stream.scenario import scenario_from_text
 from glider_stream.search.path import load_path
 from glider_stream.water.mapping.dive_files import read_dives
 
@@ -130,3 +132,11 @@ def test_dives_too_fast_backward_or_of_one_place_and_two_currents(tmp_path):
     lines = [line.format(a="12:00", b="15:30", lon=18.34, north=north) for north in (0.1, -0.1, -0.1)]
     file.write_text("\n".join([DIVES, *lines]))
     assert read_dives(file).north.tolist() == [0.1, -0.1]
+
+
+def test_currents_that_have_changed_do_not_matter_where_newer_ones_are_named(plan):
+    turned = open_scenario(scenario_from_text(SCENARIO.replace("speed = 0.4", "speed = -0.4")))
+    old = load_path(plan)
+    with pytest.raises(InputError, match="the currents have changed since"):
+        turned._at_fix(old, 200.0, renewed=False)
+    assert turned._at_fix(old, 200.0, renewed=True)[1] == 200.0
