@@ -1,6 +1,7 @@
 """The planner: one call for each command."""
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from os.path import realpath
 from pathlib import Path as File
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .base.arrays import Array
 from .base.checks import Range
+from .base.errors import InputWarning
 from .base.output import check_apart, check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
@@ -603,6 +605,7 @@ def assimilate(
     some = [forecast] if isinstance(forecast, (str, File)) else list(forecast)
     _check_map(output, members, [*some, *dives, *points, *drifters])
     measured = _measurements(dives, points, drifters, columns)
+    _warn_of_corrected(some)
     found = assimilate(read_currents(some, names), measured, scales, kernel=kernel, inducing=inducing, seed=seed)
     _write_map(found, output, members, seed)
     return found
@@ -658,6 +661,17 @@ def _check_map(output: str | File | None, members: int, inputs: Sequence[str | F
         for file in [output, *([members_file(output)] if members else [])]:
             check_apart(file, inputs)
             check_output(file)
+
+
+def _warn_of_corrected(files: Sequence[str | File]) -> None:
+    """Warn of forecasts that hold measurements already: the same ones must not be counted again."""
+    from .water.ocean.opening import opened
+
+    for file in files:
+        with opened(File(file)) as data:
+            if "uo_sd" in data.variables:
+                done = f"{file} was corrected by measurements already: give no measurement twice"
+                warnings.warn(f"{done}, or correct the first forecast by all of them", InputWarning, stacklevel=3)
 
 
 def _measurements(

@@ -1,5 +1,7 @@
 """Forecasts corrected by measurements, maps without a forecast, their files; the commands."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -154,8 +156,10 @@ def test_the_command_writes_a_file_as_any_other(tmp_path, monkeypatch, capsys):
     table = strict_json(said.out)
     assert table["fit"]["scales"]["length"] == 15000
     assert table["rms_after_mps"] < table["rms_before_mps"]
-    again = read_currents("again-members.nc", {"member": 1})
-    assert again.u.tobytes() == members[1].u.tobytes()
+    for name in ("better", "better-members"):
+        assert Path(f"{name}.nc").read_bytes() == Path(f"{name.replace('better', 'again')}.nc").read_bytes()
+    twice = command(capsys, "assimilate", "better.nc", *given, "-o", "twice.nc")
+    assert "better.nc was corrected by measurements already: give no measurement twice" in twice.err
 
 
 def test_a_map_without_a_forecast(tmp_path, monkeypatch, capsys):

@@ -1,7 +1,6 @@
 """Writes currents as CF NetCDF that this package and others read."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -61,12 +60,12 @@ def write_currents(
         coordinates["depth"][2]["bounds"] = "depth_bnds"
         upper = np.concatenate([[file.top], file.lower[:-1]])
         variables["depth_bnds"] = (("depth", "bound"), np.stack([upper, file.lower], axis=-1), {})
-    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     attrs = {
         "Conventions": "CF-1.11",
         "title": title,
         "comment": comment,
-        "history": f"{now} glider-stream {version('glider-stream')}, from {file.name}",
+        # no date: the same inputs give the same file
+        "history": f"glider-stream {version('glider-stream')}, from {file.name}",
     }
     data = xarray.Dataset(variables, coordinates, attrs)
     for key, variable in data.variables.items():
