@@ -33,7 +33,7 @@ from glider_stream.search.query import Planner
 from glider_stream.water.inspect import is_steady
 
 verify.LEGS_AT_ONCE = 500  # a step costs the same for one leg and for many
-COMMON = 60
+COMMON = 30
 MEMORY = Path("/dev/shm")
 """Files are made here where the system has it: a disk that must keep each of them is slow."""
 GOALS = 6
