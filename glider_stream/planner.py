@@ -298,7 +298,7 @@ def replan(
         >>> path = planner.query("small.h5", outputs=["plan.json"])
         >>> answer = planner.replan("plan.json", (-60.0, 60.0), 200.0)
         >>> answer.new.found, answer.good.whole
-        (True, True)
+        (True, False)
     """
     refines = options.get("within") is not None or options.get("seconds") is not None
     split_outputs(options.get("outputs", ()), refines)  # before the roadmap is read

@@ -331,7 +331,8 @@ PATHS = {
     "rows of three": PATH % ("1", "[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]"),
     "back in time": PATH % ("1", "[[5, 0, 0, 0], [1, 0, 0, -1]]"),
     "no time at all": PATH % ("0", "[[0, 0, 0, 0], [0, 0, 0, -1]]"),
-    "another water": PATH.replace("[0, 0, -1]", "[0, 9999, -1]") % ("1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
+    "another water": PATH.replace("[0, 0, 0]", "[0, 9999, 0]").replace("[0, 0, -1]", "[0, 9999, -0.479]")
+    % ("1", "[[0, 0, 9999, 0], [1, 0, 9999, -0.479]]"),
     "legs that were not found": PATH.replace("true", "false") % ("1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a time below 0": PATH % ("-1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a leg from nowhere": '{"found": true, "cost": 1, "legs": [{"from": [1, 2], "to": [1, 2, 3]}]}',

@@ -101,10 +101,6 @@ def test_ruff_format():
     run("-m", "ruff", "format", "--check", ".")
 
 
-def test_mypy():
-    run("-m", "mypy")
-
-
 def test_ruff_is_pinned_to_what_runs():
     """Another version formats otherwise: the pin, the hooks and the checks must be one."""
     pins = [need for need in PROJECT["project"]["optional-dependencies"]["test"] if need.startswith("ruff")]

@@ -1,6 +1,5 @@
 """What a type checker sees of the package: the types that a user's program gets, none of them `Any`."""
 
-import os
 import re
 import subprocess
 import sys
@@ -10,6 +9,7 @@ import pytest
 
 import glider_stream
 
+ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.slow
 
 EXPRESSIONS = {
@@ -19,31 +19,33 @@ EXPRESSIONS = {
     "planner.query('small.h5').legs[0].depart": "float",
     "planner.table('small.h5', [(0.0, 0.0, 0.0)], [(1.0, 1.0, -1.0)])": "numpy.ndarray[",
 }
+ASKED = [*(f"glider_stream.{name}" for name in glider_stream.__all__), *EXPRESSIONS]
 WRONG = "planner.query('small.h5', wrong=1)"
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory):
-    """Each line of a user's program, and what mypy says of it."""
-    folder = tmp_path_factory.mktemp("user")
-    names = [f"glider_stream.{name}" for name in glider_stream.__all__]
-    asked = [*names, *EXPRESSIONS]
+def checked(tmp_path_factory):
+    """A user's program, and what mypy prints of it and of the package: one run, each reads all imports."""
     lines = ["import glider_stream", "from glider_stream import planner"]
-    lines += [*(f"reveal_type({expression})" for expression in asked), WRONG]
-    program = folder / "program.py"
+    lines += [*(f"reveal_type({expression})" for expression in ASKED), WRONG]
+    program = tmp_path_factory.mktemp("user") / "program.py"
     program.write_text("\n".join(lines) + "\n")
-    options = "--strict", "--follow-imports=silent", "--cache-dir", str(folder / "cache")
-    ended = subprocess.run(
-        [sys.executable, "-m", "mypy", *options, str(program)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env=os.environ | {"MYPYPATH": str(Path(glider_stream.__file__).parents[1])},
-    )
-    said = re.findall(r"^program.py:(\d+): (.*)$", ended.stdout, re.MULTILINE)
+    mypy = [sys.executable, "-m", "mypy", "glider_stream", str(program)]
+    return lines, subprocess.run(mypy, capture_output=True, text=True, check=False, cwd=ROOT).stdout
+
+
+@pytest.fixture(scope="module")
+def seen(checked):
+    """Each line of the program, and what mypy says of it."""
+    lines, printed = checked
+    said = re.findall(r"program\.py:(\d+): (.*)$", printed, re.MULTILINE)
     by_line = {lines[int(number) - 1]: text for number, text in said if " defined in " not in text}
-    return {expression: by_line[f"reveal_type({expression})"] for expression in asked} | {WRONG: by_line[WRONG]}
+    return {expression: by_line[f"reveal_type({expression})"] for expression in ASKED} | {WRONG: by_line[WRONG]}
+
+
+def test_the_package_has_no_error(checked):
+    assert [line for line in checked[1].splitlines() if "program.py:" not in line][:-1] == []
+    assert "Found 1 error in 1 file" in checked[1]
 
 
 @pytest.mark.parametrize("name", glider_stream.__all__)
