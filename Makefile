@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV ?= .venv
 RUN = $(VENV)/bin
 
-.PHONY: install demo test quick lint types docs bench clean
+.PHONY: install demo test nightly quick lint types docs bench clean
 
 install: $(VENV)/installed
 
@@ -22,10 +22,13 @@ demo: install
 	@echo "exact: the flow map, to all nodes. Look at demo/routes.png: both routes, with their times."
 
 test: install
+	$(RUN)/python -m pytest -n 2 --dist worksteal -m "not wide"
+
+nightly: install
 	$(RUN)/python -m pytest -n 2 --dist worksteal
 
 quick: install
-	$(RUN)/python -m pytest -m "not slow"
+	$(RUN)/python -m pytest -m "not slow and not wide"
 
 lint: install
 	$(RUN)/python -m ruff check .

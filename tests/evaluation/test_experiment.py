@@ -25,6 +25,7 @@ def run(monkeypatch, script, *arguments):
     runpy.run_path(str(BENCHMARKS / f"{script}.py"), run_name="__main__")
 
 
+@pytest.mark.wide
 def test_the_scripts_draw_and_go_on_where_they_were(tmp_path, monkeypatch, capsys):
     record = tmp_path / "rows.jsonl"
     for script in SCRIPTS:
@@ -44,6 +45,7 @@ def test_the_scripts_draw_and_go_on_where_they_were(tmp_path, monkeypatch, capsy
         assert edges[seed, "flow map", None] >= edges[seed, "streamline", 16] > edges[seed, "surface", 16]
 
 
+@pytest.mark.wide
 def test_the_two_cases_are_drawn(tmp_path, monkeypatch, capsys):
     run(monkeypatch, "two_cases", "--quick", "-o", tmp_path)
     for candidates in (16, 54):

@@ -20,6 +20,7 @@ SPEC.loader.exec_module(fuzz)
 PARTS = 5
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("part", range(PARTS))
 def test_the_first_scenarios(part):
     lines = [fuzz.tried(number) for number in range(part, fuzz.COMMON, PARTS)]

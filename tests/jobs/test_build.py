@@ -191,7 +191,7 @@ def test_two_builds_at_once(place):
     assert not Path("road.h5.glider-stream.lock").exists()
 
 
-@pytest.mark.parametrize("count", [1, 2, 5, 100])
+@pytest.mark.parametrize("count", [1, 2, 5, pytest.param(100, marks=pytest.mark.wide)])
 def test_shards_make_the_whole(place, count):
     expected.cache_clear()
     numbers = range(1, count + 1)

@@ -36,10 +36,10 @@ def place(tmp_path, monkeypatch):
     ("law", "change"),
     [
         ("flow map", 0.5),
-        ("refined", 0.5),
         ("reachable", 1.6),
         ("radius", 0.5),
-        ("flow map", 1.6),
+        pytest.param("refined", 0.5, marks=pytest.mark.wide),
+        pytest.param("flow map", 1.6, marks=pytest.mark.wide),
     ],
 )
 def test_a_tenth_of_the_current_changes(place, law, change):

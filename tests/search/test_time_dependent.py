@@ -76,7 +76,9 @@ def flown(flow, path):
     return np.array(places)
 
 
-@pytest.mark.parametrize("name", FLOWS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.wide] * (name in ("streamline", "radius"))) for name in FLOWS]
+)
 def test_what_is_exported_flies_from_end_to_end(name, tmp_path):
     planner = clock([*FLOWS[name], "query.departure=200.0"])
     for ends in [(None, None), ((150.0, 700.0, -40.0), (1500.0, 250.0, -210.0))]:
