@@ -48,7 +48,10 @@ def test_as_a_module_and_as_a_command():
     assert module.returncode == 0
 
 
-@pytest.mark.parametrize("where", ["2>/dev/full", "2> >(exit)", "<&- 1>&- 2>&-"])
+@pytest.mark.parametrize(
+    "where",
+    ["2>/dev/full", *(pytest.param(one, marks=pytest.mark.wide) for one in ("2> >(exit)", "<&- 1>&- 2>&-"))],
+)
 def test_progress_with_standard_error_closed(place, where):
     if "/dev/full" in where and not Path("/dev/full").exists():
         pytest.skip("no /dev/full here")

@@ -124,6 +124,7 @@ def test_the_card_reads_the_current_of_the_time_at_which_a_leg_passes(road):
     assert [row.along for row in here.card(path).legs] == [row.along for row in road.card(path).legs]
 
 
+@pytest.mark.wide
 def test_when_to_leave_asks_the_slices(file, capsys):
     said = command(capsys, "query", file, "--depart-between", "0", "600", "--every", "300", "--json")
     rows = json.loads(said.out)["departures"]
