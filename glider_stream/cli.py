@@ -105,6 +105,7 @@ TRACE = "GLIDER_STREAM_TRACE"
 FILE = click.Path(path_type=Path)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 ROADMAP = click.argument("roadmap", type=FILE)
+SET = click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
 ELSEWHERE = click.option(
     "--set",
     "overrides",
@@ -134,7 +135,7 @@ def cli() -> None:
 @click.argument("scenario")
 @click.option("-o", "--output", required=True, type=FILE, help="The roadmap file to write.")
 @click.option("--threads", type=int, help="Threads to use; all cores if not given.")
-@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@SET
 @click.option("--shard", metavar="K/N", help="Build only part K of N, for `merge`.")
 @click.option("--restart", is_flag=True, help="Discard what a stopped build has kept, and start again.")
 @click.option(
@@ -309,7 +310,7 @@ def query(roadmap: Path, overrides: tuple[str, ...], **options: Any) -> None:
 @cli.command()
 @click.argument("scenario")
 @route_options
-@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@SET
 def plan(scenario: str, overrides: tuple[str, ...], **options: Any) -> None:
     """Find a route of SCENARIO without a roadmap.
 
@@ -338,9 +339,7 @@ def plan(scenario: str, overrides: tuple[str, ...], **options: Any) -> None:
 @click.option("--currents", multiple=True, type=FILE, help="A newer current file; repeatable.")
 @click.option("--roadmap", type=FILE, help="The roadmap to search, if not the one that PLAN names.")
 @click.option("--scenario", help="The scenario, if PLAN does not name one.")
-@click.option(
-    "--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key of the scenario."
-)
+@SET
 @click.option(
     "--tolerance",
     type=Percentage(),
@@ -662,7 +661,7 @@ def lint(files: tuple[Path, ...], waypoints: int, as_json: bool) -> None:
 
 @cli.command()
 @click.argument("scenario")
-@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@SET
 @click.option("--nodes", type=int, help="Nodes along the longest side of the finer grid; 101 in 2-D, 61 in 3-D.")
 @click.option(
     "--dimensions", type=int, help="2: the mean current of a yo's depths; 3: all depths; 2 for long routes."
@@ -925,7 +924,7 @@ def bench(
 )
 @click.option("--processes", type=int, help="Processes that share the runs; one for each core if not given.")
 @click.option("--scheduler", metavar="ADDRESS", help="Fly on a Dask cluster; local:N for N processes here.")
-@click.option("--set", "overrides", multiple=True, metavar="SECTION.KEY=VALUE", help="Override a key.")
+@SET
 @click.option("--restart", is_flag=True, help="Discard the runs that a stopped campaign has kept.")
 @click.option("--run", "number", type=int, default=0, show_default=True, help="The run that a page plays.")
 @click.option("--policy", default="replan", show_default=True, help="The policy that a page plays.")

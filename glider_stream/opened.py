@@ -41,11 +41,11 @@ from .scenario import (
     with_currents,
 )
 from .search.answer import Ends, best_path, front, planner_of
-from .search.assembly import Assembly, RoutePlanner
+from .search.assembly import RoutePlanner
 from .search.departures import Departures, Moment, seconds, when_to_leave
-from .search.flown_on import check_currents, check_plan, flown_on, located
+from .search.flown_on import check_currents, check_plan, flown_on
 from .search.least_time import GreatestSpeeds, least_cost
-from .search.path import SURFACE, Origin, Path, load_path
+from .search.path import SURFACE, Origin, Path, load_path, placed
 from .search.query import Planner
 from .search.refine import Asked, refined
 from .search.surfacing import Surfacing
@@ -312,7 +312,7 @@ class OpenedScenario:
                 f"searched among {share:.0%} of the nodes, those on ways of the roadmap's legs at most {NEAR:.0%}"
             )
             notes = (*notes, f"{among} longer than their best; --all-nodes searches all, which takes longer")
-        old = located(old, Assembly(before.leaving(-since), frozen=False))
+        old = placed(old, before.leaving(-since))
         flown = flown_on(old, since, place, leaves)
         current = None
         if dac is not None:

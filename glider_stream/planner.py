@@ -55,6 +55,8 @@ if TYPE_CHECKING:
 
 AnyRoadmap = str | File | Roadmap | SlicedRoadmap | OpenedRoadmap
 """A roadmap: the name of its file, an object, or an opened one, which keeps what queries need."""
+MAP_ENDS = (".nc", ".nc4")
+"""The endings of maps of currents that are written: they are NetCDF."""
 
 
 def build(
@@ -655,9 +657,7 @@ def _check_map(output: str | File | None, members: int, inputs: Sequence[str | F
     require(members == 0 or output is not None, "`members` need an output file; name one")
     if output is not None:
         check_apart(output, inputs)
-        require(
-            File(output).suffix.lower() in (".nc", ".nc4"), f"the output {output} must end in .nc: it is NetCDF"
-        )
+        require(File(output).suffix.lower() in MAP_ENDS, f"the output {output} must end in .nc: it is NetCDF")
         for file in [output, *([members_file(output)] if members else [])]:
             check_apart(file, inputs)
             check_output(file)
@@ -668,6 +668,8 @@ def _warn_of_corrected(files: Sequence[str | File]) -> None:
     from .water.ocean.opening import opened
 
     for file in files:
+        if File(file).suffix.lower() not in MAP_ENDS:
+            continue
         with opened(File(file)) as data:
             if "uo_sd" in data.variables:
                 done = f"{file} was corrected by measurements already: give no measurement twice"

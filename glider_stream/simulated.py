@@ -12,6 +12,7 @@ from .mission.campaign import Campaign
 from .mission.replay import path_of
 from .mission.run import Runner
 from .mission.settings import Mission
+from .search.path import placed
 
 Show = tuple[int, str]
 """The run and the policy that a page plays."""
@@ -69,7 +70,6 @@ def _write_figure(campaign: Campaign, runner: Runner, path: Path, show: Show) ->
 
 
 def _write_page(campaign: Campaign, runner: Runner, path: Path, show: Show) -> None:
-    from .plot.along import placed
     from .plot.page import Replay, save_page
     from .roadmap.builder import node_positions
 

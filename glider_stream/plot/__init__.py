@@ -1,6 +1,7 @@
 """Figures: a route in its current (like figure 4 of the paper), a roadmap, and steering."""
 
-from .along import Along, along, placed
+from ..search.path import placed
+from .along import Along, along
 from .canvas import check_figure, save_figure
 from .chart import plot_chart
 from .comparison import Mean, Series, plot_comparison

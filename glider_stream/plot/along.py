@@ -1,7 +1,6 @@
 """The steps of a route: speed over ground, course, and the current in which it was planned."""
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,10 +8,9 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..search.path import Path
-from ..water.frame import true_north
 
 if TYPE_CHECKING:
-    from ..roadmap.problem import Problem
+    pass
 
 SHORTEST = 1e-3
 """A step shorter than this [s] is the remainder of an integration; its speed would be noise."""
@@ -54,21 +52,3 @@ def along(path: Path) -> Along:
         parts.append(np.stack(columns))
     time, number, *rest = np.concatenate([np.empty((8, 0)), *parts], axis=1)
     return Along(time, number.astype(np.intp), *rest)
-
-
-def placed(path: Path, problem: "Problem") -> Path:
-    """Return a path with the longitudes, latitudes and true north that a path file leaves out, if geographic."""
-    to_lonlat = problem.to_lonlat
-    if to_lonlat is None:
-        return path
-    legs = tuple(
-        replace(
-            leg,
-            lonlat=to_lonlat(np.stack([leg.start, leg.end])),
-            track=to_lonlat(leg.trajectory[:, 1:]),
-            north=true_north(to_lonlat, leg.start),
-        )
-        for leg in path.legs
-    )
-    departs = path.departs or problem.departs
-    return replace(path, legs=legs, lonlat=to_lonlat(np.stack([path.start, path.goal])), departs=departs)

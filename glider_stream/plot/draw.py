@@ -11,9 +11,8 @@ from ..base.output import check_output
 from ..base.settings import require
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
-from ..search.path import Path
+from ..search.path import Path, placed
 from ..water.inspect import is_steady
-from .along import placed
 from .canvas import EARLIEST, check_figure, save_figure
 from .chart import plot_chart
 from .fronts import Fronts, fronts_of

@@ -7,7 +7,7 @@ ends does.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -59,24 +59,6 @@ class FlownOn:
     miss: float
     why: str
     stops: tuple[Stop, ...]
-
-
-def located(path: Path, assembly: Assembly) -> Path:
-    """Return a path that was read from a file with its longitudes and latitudes and its directions of north."""
-    to_lonlat = assembly.problem.to_lonlat
-    departs = assembly.problem.departs
-    if to_lonlat is None:
-        return replace(path, departs=departs)
-    legs = tuple(
-        replace(
-            leg,
-            lonlat=to_lonlat(np.stack([leg.start, leg.end])),
-            track=to_lonlat(leg.trajectory[:, 1:]),
-            north=true_north(to_lonlat, leg.start),
-        )
-        for leg in path.legs
-    )
-    return replace(path, legs=legs, lonlat=to_lonlat(np.stack([path.start, path.goal])), departs=departs)
 
 
 def check_plan(path: Path, problem: Problem) -> None:
@@ -136,7 +118,7 @@ def next_leg(path: Path, since: float) -> int:
 
 
 def flown_on(path: Path, since: float, place: Array, problem: Problem) -> FlownOn:
-    """Fly the rest of a `located` path's trims from a fix (3,) [m], `since` [s] after the path's departure.
+    """Fly the rest of a `placed` path's trims from a fix (3,) [m], `since` [s] after the path's departure.
 
     The problem leaves at the fix. The clock runs. The vehicle keeps the compass bearings of the plan.
     """

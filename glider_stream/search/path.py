@@ -3,10 +3,10 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path as File
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from ..base.errors import InputError
 from ..base.settings import from_table, require
 from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
+from ..water.frame import true_north
+
+if TYPE_CHECKING:
+    from ..roadmap.problem import Problem
 
 MOST_TEXT = 200_000_000
 """A path file may hold at most this many bytes; a route of a thousand legs takes some five million."""
@@ -408,3 +412,21 @@ def _numbers(table: dict[str, Any], key: str, where: str, *shape: int | None) ->
     fits = fits and float(np.abs(values).max()) <= LARGEST  # False for NaN, too
     require(fits, f"`{key}` of {where} must be finite numbers, {count} of them")
     return values
+
+
+def placed(path: Path, problem: "Problem") -> Path:
+    """Return a path with what a path file leaves out: its date, and where geographic, degrees and true north."""
+    path = replace(path, departs=path.departs or problem.departs)
+    to_lonlat = problem.to_lonlat
+    if to_lonlat is None:
+        return path
+    legs = tuple(
+        replace(
+            leg,
+            lonlat=to_lonlat(np.stack([leg.start, leg.end])),
+            track=to_lonlat(leg.trajectory[:, 1:]),
+            north=true_north(to_lonlat, leg.start),
+        )
+        for leg in path.legs
+    )
+    return replace(path, legs=legs, lonlat=to_lonlat(np.stack([path.start, path.goal])))

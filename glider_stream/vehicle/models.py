@@ -6,6 +6,7 @@ is one dataclass and one row of MODELS.
 """
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +22,7 @@ SOLVE_STEPS = 100  # 4 to 7 steps are enough in a usable range, 20 within 1e-12 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Glider:
+class Glider(ABC):
     """The base of all models: `angles` [degrees], the range of |gamma|, and `gravity` [m/s^2]."""
 
     angles: tuple[float, float]
@@ -71,20 +72,20 @@ class Glider:
         """The `feasible_limits`, computed once, since a fit needs them some thousand times."""
         return self.feasible_limits()
 
+    @abstractmethod
     def feasible_limits(self) -> tuple[float, float]:
         """Return two limits [rad] of gamma: dives lie below the first and climbs above the second.
 
         No steady glide exists between them.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def _net_masses(self) -> tuple[float, float]:
         """Return the net mass [kg] in a dive and in a climb."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _glide(self, gamma: Array) -> tuple[Array, Array]:
         """Return V [m/s] and alpha [rad] at feasible angles."""
-        raise NotImplementedError
 
     def _feasible(self, gamma: Array | float) -> Array:
         """Return the angles [rad], with NaN where no steady glide exists."""

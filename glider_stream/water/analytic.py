@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +19,7 @@ BEYOND = 50.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnalyticFlow:
+class AnalyticFlow(ABC):
     """Settings that every analytic flow has: where and when the flow is known, and `sampled`.
 
     `x`, `y` [m] are the box in which the flow is known. A flow that changes is known at `times` [s], from the
@@ -39,15 +40,15 @@ class AnalyticFlow:
             require_positive(spacing, "flow.sampled")
         self.check()
 
-    def check(self) -> None:
+    def check(self) -> None:  # noqa: B027  (many flows have nothing to check)
         """Raise InputError if a value of this flow is not usable."""
 
+    @abstractmethod
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
         """Return the kernel's class and its fields; `depth` [m, downward] is the range that the plan uses.
 
         The fields of `Extent` may be left out where the flow has no bounds of its own.
         """
-        raise NotImplementedError
 
     def kernel(self, z: Range) -> kernel.Flow:
         """Return the flow as the kernels read it; `z` [m, upward] is the range of heights that the plan uses."""

@@ -17,8 +17,8 @@ from glider_stream.base.errors import InputError, InputWarning
 from glider_stream.kernels.flow import velocity
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
-from glider_stream.search.flown_on import flown_on, located, next_leg
-from glider_stream.search.path import load_path
+from glider_stream.search.flown_on import flown_on, next_leg
+from glider_stream.search.path import load_path, placed
 
 
 def end_of(flow, leg, begins):
@@ -68,7 +68,7 @@ def test_at_the_start_nothing_changes(small, road):
 
 
 def test_the_old_list_flown_on_is_the_flight_of_its_trims(small, road):
-    old = located(load_path(small / "plan.json"), road.planner().assembly)
+    old = placed(load_path(small / "plan.json"), road.problem)
     place, problem = np.array([-180.0, 150.0, 0.0]), road.problem
     found = flown_on(old, 0.0, place, problem)
     here, clock = place, 0.0

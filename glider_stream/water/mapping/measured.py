@@ -125,8 +125,39 @@ class Points(_Table):
         return at_points(*frame.to_local(self.lon, self.lat), self.depth, u, v, t=t, error=self.error)
 
 
+class _Ways(_Table):
+    """Ways from one place and time to another."""
+
+    lon: Array
+    lat: Array
+    lon_end: Array
+    lat_end: Array
+    start: Times
+    end: Times
+
+    @property
+    def count(self) -> int:
+        """See Measurements."""
+        return self.lon.size
+
+    @property
+    def places(self) -> tuple[Array, Array]:
+        """See Measurements."""
+        return np.concatenate([self.lon, self.lon_end]), np.concatenate([self.lat, self.lat_end])
+
+    @property
+    def times(self) -> tuple[Times, Times] | None:
+        """See Measurements."""
+        return self.start, self.end
+
+    def _ends(self, frame: LocalFrame) -> tuple[Array, Array]:
+        """Return where the ways begin and end (n, 2) [m] in a frame."""
+        begin = np.stack(frame.to_local(self.lon, self.lat), axis=-1)
+        return begin, np.stack(frame.to_local(self.lon_end, self.lat_end), axis=-1)
+
+
 @dataclass(frozen=True)
-class Dives(_Table):
+class Dives(_Ways):
     """Currents averaged over dives, `east`, `north` and `error` [m/s], as gliders compute them at the surface.
 
     From `lon`, `lat` to `lon_end`, `lat_end` [degrees], from `start` to `end` (UTC), to the depth `bottom` [m]
@@ -167,32 +198,16 @@ class Dives(_Table):
             ends = f"the dive of {self.start[n]} ends {speed.max() * lasting[n] / 1000:,.0f} km from its start"
             require(False, f"{ends}, at {speed.max():.1f} m/s, faster than any glider; mend its fixes or times")
 
-    @property
-    def count(self) -> int:
-        """See Measurements."""
-        return self.lon.size
-
-    @property
-    def places(self) -> tuple[Array, Array]:
-        """See Measurements."""
-        return np.concatenate([self.lon, self.lon_end]), np.concatenate([self.lat, self.lat_end])
-
-    @property
-    def times(self) -> tuple[Times, Times] | None:
-        """See Measurements."""
-        return self.start, self.end
-
     def observations(self, frame: LocalFrame, epoch: np.datetime64 | None) -> Observations:
         """See Measurements."""
-        begin = np.stack(frame.to_local(self.lon, self.lat), axis=-1)
-        finish = np.stack(frame.to_local(self.lon_end, self.lat_end), axis=-1)
+        begin, finish = self._ends(frame)
         u, v = turned(frame, self.lon, self.lat, self.east, self.north)
         times = seconds(self.start, epoch), seconds(self.end, epoch)
         return dive_averages(begin, finish, self.bottom, u, v, times=times, error=self.error, yos=self.yos)
 
 
 @dataclass(frozen=True)
-class Drifters(_Table):
+class Drifters(_Ways):
     """Displacements of drifters, each from `lon`, `lat` [degrees] at `start` (UTC) to the next fix at `end`.
 
     `depth` [m]: of the drogue; `error` [m/s]: of the mean current. Between fixes the path is taken as straight
@@ -230,25 +245,9 @@ class Drifters(_Table):
         ends = (lon[second], lat[second], time[first], time[second])
         return cls(lon[first], lat[first], *ends, depth[first], error[first])
 
-    @property
-    def count(self) -> int:
-        """See Measurements."""
-        return self.lon.size
-
-    @property
-    def places(self) -> tuple[Array, Array]:
-        """See Measurements."""
-        return np.concatenate([self.lon, self.lon_end]), np.concatenate([self.lat, self.lat_end])
-
-    @property
-    def times(self) -> tuple[Times, Times] | None:
-        """See Measurements."""
-        return self.start, self.end
-
     def observations(self, frame: LocalFrame, epoch: np.datetime64 | None) -> Observations:
         """See Measurements."""
-        begin = np.stack(frame.to_local(self.lon, self.lat), axis=-1)
-        finish = np.stack(frame.to_local(self.lon_end, self.lat_end), axis=-1)
+        begin, finish = self._ends(frame)
         # the times of a steady map are all 0, but a displacement takes its time
         lasting = seconds(self.end, self.start[0]) - seconds(self.start, self.start[0])
         fastest = float((np.hypot(*(finish - begin).T) / lasting).max())
