@@ -18,6 +18,9 @@ CLOSE = 1e-5
 """A leg that ends within this distance [m] of its stop is exact: hundreds of legs add up to a few millimetres."""
 MOST_STEPS = 12
 """At most this many Newton steps are made from a guess; a near guess needs two or three."""
+PATIENCE = 2
+"""A leg is given up after this many steps in a row that do not halve its least miss: it is too steep or too shallow
+for the polar, and would stop at its limit for ever."""
 LONGEST_TURN = 0.3
 """A Newton step changes glide angle and heading by at most this [rad]; beyond it the linear model is wrong."""
 X, Y, Z, T, Z_END, ANGLE, HEADING = range(7)
@@ -72,6 +75,7 @@ class Air:
         angle, heading = angle.copy(), heading.copy()
         lowest, highest = self.limits(begin, end)
         left: Array | float = departs
+        least, waited = np.full(len(angle), np.inf), np.zeros(len(angle), np.int64)
         for _ in range(MOST_STEPS):
             time = self.times(begin, end, angle)
             if np.ndim(departs) == 0:
@@ -80,7 +84,9 @@ class Air:
             ends = self._ends(np.stack([of, *(of + self._step(n) for n in (ANGLE, HEADING))]))
             off = end[:, :2] - ends[0]
             miss = np.hypot(*off.T)
-            if (miss <= CLOSE).all() or not np.isfinite(miss).any():
+            waited = np.where(miss < 0.5 * least, 0, waited + 1)
+            least = np.fmin(least, miss)
+            if ((miss <= CLOSE) | (waited >= PATIENCE)).all():
                 break
             by_angle, by_heading = ((ends[1 + n] - ends[0]) / self.steps[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
