@@ -73,7 +73,9 @@ class FreeAir(Air):
         time, heading = row[:, ANGLE], row[:, HEADING]
         vertical = (row[:, Z_END] - row[:, Z]) / time
         level = np.interp(vertical, *self.speeds)
-        return np.stack([level * np.cos(heading), level * np.sin(heading), vertical], axis=-1), time
+        through = np.empty((len(row), 3))
+        through[:, 0], through[:, 1], through[:, 2] = level * np.cos(heading), level * np.sin(heading), vertical
+        return through, time
 
     def along(self, begin: Array, end: Array, glides: Glides, share: float | Array) -> Array:
         """Return the positions (n, 3) [m] of legs after a share of their duration, one for all or (n,)."""

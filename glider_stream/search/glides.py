@@ -76,21 +76,26 @@ class Air:
         lowest, highest = self.limits(begin, end)
         left: Array | float = departs
         least, waited = np.full(len(angle), np.inf), np.zeros(len(angle), np.int64)
+        rows = self._three(begin, end[:, 2])
         for _ in range(MOST_STEPS):
-            time = self.times(begin, end, angle)
+            rows[:, :, ANGLE], rows[:, :, HEADING] = angle, heading
+            rows[1, :, ANGLE] += self.steps[ANGLE]
+            rows[2, :, HEADING] += self.steps[HEADING]
+            through, times = self._flights(rows.reshape(-1, 7))
+            time = times[: len(angle)]
             if np.ndim(departs) == 0:
-                left = departs + np.concatenate([[0.0], np.cumsum(time)[:-1]])
-            of = np.column_stack([begin, left, end[:, 2], angle, heading])
-            ends = self._ends(np.stack([of, *(of + self._step(n) for n in (ANGLE, HEADING))]))
+                left = departs + np.cumsum(time) - time
+            rows[:, :, T] = left
+            ends = self._flown(rows, through, times)
             off = end[:, :2] - ends[0]
-            miss = np.hypot(*off.T)
+            miss = np.hypot(off[:, 0], off[:, 1])
             waited = np.where(miss < 0.5 * least, 0, waited + 1)
             least = np.fmin(least, miss)
             if ((miss <= CLOSE) | (waited >= PATIENCE)).all():
                 break
             by_angle, by_heading = ((ends[1 + n] - ends[0]) / self.steps[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
-            turn = np.where(np.isfinite(turn), turn, 0.0)
+            turn[~np.isfinite(turn)] = 0.0
             longest = np.maximum(np.abs(turn[:, 0]) / self._longest(angle), np.abs(turn[:, 1]) / LONGEST_TURN)
             turn /= np.maximum(1.0, longest)[:, None]
             angle, heading = np.clip(angle + turn[:, 0], lowest, highest), heading + turn[:, 1]
@@ -101,21 +106,19 @@ class Air:
 
         `one_sided` uses half the flights and is less accurate; that is enough to compare two derivatives.
         """
-        of = self._rows(begin, end, glides)
+        of, away = self._rows(begin, end, glides), np.diag(self.steps)[:, None, :]
         if one_sided:
-            ends = self._ends(np.stack([of, *(of + self._step(n) for n in range(7))]))
+            ends = self._ends(np.concatenate([of[None], of + away]))
             by = (ends[1:] - ends[0]) / self.steps[:, None, None]
         else:
-            beside = [of + sign * self._step(n) for n in range(7) for sign in (1.0, -1.0)]
-            ends = self._ends(np.stack(beside))
-            by = (ends[0::2] - ends[1::2]) / (2 * self.steps[:, None, None])  # (7, n, 2)
+            ends = self._ends(np.concatenate([of + away, of - away]))
+            by = (ends[:7] - ends[7:]) / (2 * self.steps[:, None, None])  # (7, n, 2)
         # the leg must end at its stop, so the control undoes every other change of the leg's end
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
-        control = np.stack([_solve(by[ANGLE], by[HEADING], off) for off in moved], axis=1)
-        angle = control[..., 0]
-        return Slopes(self._time_slopes(begin, end, glides, angle), angle, control[..., 1])
+        angle, heading = np.moveaxis(_solve(by[ANGLE], by[HEADING], moved), (0, 2), (2, 0))
+        return Slopes(self._time_slopes(begin, end, glides, angle), angle, heading)
 
     def _time_slopes(self, begin: Array, end: Array, glides: Glides, angle: Array) -> Array:
         """Return the derivatives (n, 7) of the times, from those of the controls `angle` (n, 7)."""
@@ -161,11 +164,12 @@ class Air:
         """Return the speed V (n,) [m/s] at glide angles [rad], equal to `kernels.control.glide_speed`."""
         polar, way = self.evaluator.polar, climbs.astype(np.intp)
         last = polar.speed.shape[1] - 1
-        lowest, highest = self.angles(climbs)
-        at = np.clip((angle - lowest) / (highest - lowest) * last, 0.0, last)
+        lowest, highest = polar.shallowest[way], polar.steepest[way]
+        at = np.minimum(np.maximum((angle - lowest) / (highest - lowest) * last, 0.0), last)
         below = np.minimum(at.astype(np.intp), last - 1)
-        low = polar.speed[way, below]
-        return np.asarray(low + (at - below) * (polar.speed[way, below + 1] - low))
+        row, table = way * (last + 1) + below, polar.speed.ravel()
+        low = table[row]
+        return np.asarray(low + (at - below) * (table[row + 1] - low))
 
     def sinking(self, angle: Array, climbs: NDArray[np.bool_]) -> Array:
         """Return the vertical speed (n,) [m/s] at glide angles [rad]; it is negative in a dive."""
@@ -173,8 +177,11 @@ class Air:
 
     def through(self, angle: Array, heading: Array, climbs: NDArray[np.bool_]) -> Array:
         """Return the velocities through water (n, 3) [m/s] of controls (n,) [rad]."""
-        along = self.speed(angle, climbs) * np.cos(angle)
-        return np.stack([along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1)
+        speed = self.speed(angle, climbs)
+        along, found = speed * np.cos(angle), np.empty((len(angle), 3))
+        found[:, 0], found[:, 1] = along * np.cos(heading), along * np.sin(heading)
+        found[:, 2] = speed * np.sin(angle) * np.where(climbs, 1.0, -1.0)
+        return found
 
     def times(self, begin: Array, end: Array, angle: Array) -> Array:
         """Return the times (n,) [s] of legs with glide angles (n,) [rad]."""
@@ -204,25 +211,29 @@ class Air:
 
     def _ends(self, of: Array) -> Array:
         """Return the ends x, y (m, n, 2) [m] of legs with parameters (m, n, 7)."""
-        row = of.reshape(-1, 7)
-        through, time = self._flights(row)
-        start = np.ascontiguousarray(row[:, [X, Y, Z, T]])
-        ends = np.full((len(row), 2), np.nan)
+        return self._flown(of, *self._flights(of.reshape(-1, 7)))
+
+    def _flown(self, of: Array, through: Array, time: Array) -> Array:
+        """Return what `_ends` does, from the velocities and times that `_flights` returns."""
+        start = np.ascontiguousarray(of.reshape(-1, 7)[:, : T + 1])
+        ends = np.full((len(start), 2), np.nan)
         task = partial(fly_legs, self.evaluator.flow, start, through, time, self.evaluator.integration.dt, ends)
-        in_parallel(task, len(row), LEGS_AT_ONCE)
+        in_parallel(task, len(start), LEGS_AT_ONCE)
         return ends.reshape(*of.shape[:2], 2)
 
-    def _step(self, n: int) -> Array:
-        """Return the step (7,) that changes only parameter `n` of a leg."""
-        step = np.zeros(7)
-        step[n] = self.steps[n]
-        return step
+    @staticmethod
+    def _three(begin: Array, height: Array) -> Array:
+        """Return parameters (3, n, 7) of legs and two beside each, without departures and controls."""
+        rows = np.empty((3, len(begin), 7))
+        rows[:, :, :T], rows[:, :, Z_END] = begin, height
+        return rows
 
 
 def _solve(by_first: Array, by_second: Array, off: Array) -> Array:
-    """Return the unknowns (a, b), (n, 2), of by_first * a + by_second * b = off; all inputs are (n, 2)."""
-    det = by_first[:, 0] * by_second[:, 1] - by_second[:, 0] * by_first[:, 1]
+    """Return the unknowns (a, b), (..., 2), of by_first * a + by_second * b = off; all inputs are (..., 2)."""
+    det = by_first[..., 0] * by_second[..., 1] - by_second[..., 0] * by_first[..., 1]
+    found = np.empty(np.broadcast_shapes(by_first.shape, off.shape))
     with np.errstate(divide="ignore", invalid="ignore"):
-        a = (by_second[:, 1] * off[:, 0] - by_second[:, 0] * off[:, 1]) / det
-        b = (by_first[:, 0] * off[:, 1] - by_first[:, 1] * off[:, 0]) / det
-    return np.stack([a, b], axis=-1)
+        found[..., 0] = (by_second[..., 1] * off[..., 0] - by_second[..., 0] * off[..., 1]) / det
+        found[..., 1] = (by_first[..., 0] * off[..., 1] - by_first[..., 1] * off[..., 0]) / det
+    return found
