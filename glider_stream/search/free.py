@@ -61,7 +61,8 @@ class FreeAir(Air):
     def limits(self, begin: Array, end: Array) -> tuple[Array, Array]:
         """Return the least durations (n,) [s]; there is no greatest."""
         rise, (vertical, _) = end[:, 2] - begin[:, 2], self.speeds
-        return rise / np.where(rise > 0, vertical[-1], vertical[0]), np.full(len(rise), np.inf)
+        least = rise / np.where(rise > 0, vertical[-1], vertical[0])
+        return np.maximum(least, TINY), np.full(len(rise), np.inf)
 
     def _longest(self, angle: Array) -> Array | float:
         return LONGEST_CHANGE * angle
