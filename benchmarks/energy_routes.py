@@ -1,9 +1,9 @@
 """Routes of least energy against exact ones, found by extremals: as they are found, polished, and refined.
 
-The currents are alike at all depths and the pump's energy is k |z|, so no route from surface to surface takes
-less than the integral of L = P + k |w| / 2: P is the hotel load, |w| the vertical speed; each metre down is pumped
-once or more. One dive and one climb take just that. What is left is a problem in the plane, solved by Pontryagin's
-maximum principle. Along a best route
+The currents are alike at all depths and the pump's energy is k |z|. So no route from surface to surface takes
+less than the integral of L = P + k |w| / 2, P the hotel load, |w| the vertical speed: each metre down is pumped
+for once or more. One dive and one climb take just that. What is left is a problem in the plane, which
+Pontryagin's maximum principle solves. Along a best route
 
     H = q . u + max over the glide angle of (|q| Vh - L) = 0,  dq/dt = -(grad u)^T q,  heading along q,
 
@@ -42,12 +42,16 @@ Floats = NDArray[np.float64]
 HOTEL, VOLUME, SHARE, DENSITY = 0.5, 20.0, 0.3, 1025.0
 """Hotel load [W], pumped volume [cc], the pump's efficiency, density [kg/m^3]: a best glide that is neither the
 polar's shallowest nor its fastest."""
-FAN, STEP, LATEST = 1440, 2.0, 3000.0
+FAN, STEP, LATEST = 2880, 2.0, 3000.0
 """Headings of the first fan, and the time step and the end of an extremal [s]."""
-ROUNDS, FINER = 5, 41
-"""Each near heading is searched again so many times, by so many headings."""
+NEAR = 100.0
+"""Headings that pass the goal nearer than this [m], and nearer than those beside them, are searched again."""
+ROUNDS, FINER = 6, 41
+"""They are searched so many times, by so many headings each."""
 BESIDE = 0.01
 """The gradient of the current is measured over this distance [m], to each side."""
+SLOWER = 0.45
+"""The vortices' speeds are multiplied by this: no weaker with depth, they would else scatter the extremals."""
 WAYS: dict[str, dict[str, Any]] = {
     "found": {},
     "polished": {"polish": True},
@@ -144,18 +148,15 @@ class Plane:
         """The least energy [J] of all extremals that meet the goal."""
         headings = np.linspace(-math.pi, math.pi, FAN, endpoint=False)
         near, _ = self.passes(headings)
-        low = (near <= np.roll(near, 1)) & (near <= np.roll(near, -1)) & (near < 30.0)
-        found, width = [], 2 * math.pi / FAN
-        for heading in headings[low]:
-            span, best = width, float(heading)
-            for _ in range(ROUNDS):
-                fan = best + np.linspace(-span, span, FINER)
-                near, cost = self.passes(fan)
-                at = int(np.argmin(near))
-                best, span = float(fan[at]), 2 * span / (FINER - 1)
-            if near[at] < 1e-3:
-                found.append(float(cost[at]))
-        return min(found)
+        low = (near <= np.roll(near, 1)) & (near <= np.roll(near, -1)) & (near < NEAR)
+        best, span = headings[low], 2 * math.pi / FAN
+        cost = np.full(best.size, np.inf)
+        for _ in range(ROUNDS):
+            fans = best[:, None] + np.linspace(-span, span, FINER)
+            near, cost = (values.reshape(fans.shape) for values in self.passes(fans.ravel()))
+            at = np.arange(best.size), near.argmin(axis=1)
+            best, near, cost, span = fans[at], near[at], cost[at], 2 * span / (FINER - 1)
+        return float(cost[near < 1e-3].min())
 
 
 def closed_form(problem: Problem, current: Floats) -> float:
@@ -180,7 +181,7 @@ def problems() -> dict[str, dict[str, Any]]:
     box["cost"]["efficiency"] = [[100.0, SHARE]]
     sides = {"x": [-600.0, 600.0], "y": [-600.0, 600.0]}
     flat = [
-        {n: 0.6 * v if n == "speed" else v for n, v in row.items() if n not in ("depth", "thickness")}
+        {n: SLOWER * v if n == "speed" else v for n, v in row.items() if n not in ("depth", "thickness")}
         for row in random_vortices(1)
     ]
     flows = {
