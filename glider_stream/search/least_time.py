@@ -41,7 +41,7 @@ class GreatestSpeeds:
         """Read the flow where gliders may pass between nodes (n, 3) [m], from the time `since` [s] on."""
         flow, polar = problem.evaluator.flow, problem.evaluator.polar
         self.through = float(polar.best_horizontal.max())
-        self.sink = fastest_sink(polar)
+        self.sink = fastest_sink(polar) + kernel.max_rise(flow)
         angle = np.arange(DIRECTIONS) * (2 * math.pi / DIRECTIONS)
         self.directions = np.stack([np.cos(angle), np.sin(angle)])
         low, high = _box(flow, problem, position)
