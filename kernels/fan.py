@@ -157,8 +157,8 @@ def levels_in_reach(medium, bins, sweep):
 def fan_rows(polar, direction, slowest, rows):
     """Glide angles of the coarsest mesh's rows, rising, into `rows`; False where no level is in reach.
 
-    From the shallowest with the vertical speed `slowest` [m/s], which just reaches a level in time, in even ratios
-    of the vertical speed: so a row that just misses a level in time is late by one ratio at most.
+    From the shallowest with the vertical speed `slowest` [m/s], which reaches a level in time, in even ratios of
+    the vertical speed: so a row that just misses a level in time is late by one ratio at most.
     """
     shallow = angle_of_vertical_speed(polar, direction, slowest)
     steep = polar.steepest[direction]

@@ -31,7 +31,7 @@ LANE_X_LO, LANE_X_HI, LANE_Y_LO, LANE_Y_HI = _ROWS[2:6]
 START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z, GOAL_T = _ROWS[6:14]
 """The ends of the flight's leg, where it has one: `keep_ends` writes them, `ends_of` reads them."""
 LANE_TO, LANE_WAY = _ROWS[14:16]
-"""The height [m] at which a flight in a flow that rises ends, and the way there: 1 up, -1 down, 0 for no height."""
+"""The height [m] at which a flight in a flow that rises ends, and the way there: 1 up, -1 down, 0 for none."""
 _BEFORE_X, _BEFORE_Y, _BEFORE_Z, _BEFORE_T = _ROWS[16:]
 FLIGHT_ROWS = _ROWS.stop
 

@@ -183,7 +183,7 @@ class Rolls(NamedTuple):
 
 
 class Abc(NamedTuple):
-    """The flow of Arnold, Beltrami and Childress: `a`, `b`, `c` [m/s], waves of `number` [1/m] along each axis."""
+    """The flow of Arnold, Beltrami and Childress: `a`, `b`, `c` [m/s], waves of `number` [1/m]."""
 
     a: float
     b: float

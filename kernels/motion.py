@@ -10,7 +10,6 @@ from .flow import by_rise, carry, contains, current, rises, velocity
 from .place import Place
 from .terrain import allowed, open_between
 
-
 CROSSED = 1e-7
 """A path has reached a height at this distance [m] from it."""
 EMERGED = 1e-3

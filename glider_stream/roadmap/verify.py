@@ -111,7 +111,7 @@ def replayed_misses(
 
     def rising(share: float, at: Array, u: Array, v: Array, w: Array, duration: Array, t: Array) -> Array:
         flow_uvw = currents(evaluator.flow, *at.reshape(3, -1), t + share * duration)
-        return np.asarray(((flow_uvw.T + [u, v, w]) * duration).ravel())
+        return np.asarray(((flow_uvw.T + np.stack([u, v, w])) * duration).ravel())
 
     off = np.empty(len(values))
     how: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-7, "max_step": 0.02}

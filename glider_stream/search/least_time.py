@@ -124,7 +124,7 @@ def greatest(
     The cells have the middles x, y and the side `size` [m]. All heights within `z` [m] and all times from `since`
     [s] on count.
     """
-    if isinstance(flow, kernel.OceanGrid):
+    if isinstance(flow, (kernel.OceanGrid, kernel.RisingOceanGrid)):
         return _of_grid(flow, x, y, size, z, since, directions)
     period = kernel.cycle(flow)
     if math.isinf(period):  # the flow has neither a period nor a grid, so no set of times is enough
@@ -144,7 +144,7 @@ def greatest(
 
 
 def _of_grid(
-    flow: kernel.OceanGrid,
+    flow: kernel.OceanGrid | kernel.RisingOceanGrid,
     x: Array,
     y: Array,
     size: float,
@@ -159,7 +159,7 @@ def _of_grid(
     known = np.full((directions.shape[1], *flow.values.shape[2:4]), -np.inf)
     for moment in flow.values[first:, low:high]:
         for level in moment:
-            known = np.maximum(known, np.moveaxis(level @ directions, -1, 0))
+            known = np.maximum(known, np.moveaxis(level[..., :2] @ directions, -1, 0))
     near = _indices(flow, x, y)
     # the number of indices that a cell spans; the map of indices is smooth
     moved = _indices(flow, x + size, y), _indices(flow, x, y + size)
@@ -170,7 +170,7 @@ def _of_grid(
     return np.minimum(wide[:, i, j], flow.extent.max_speed)
 
 
-def _indices(flow: kernel.OceanGrid, x: Array, y: Array) -> Array:
+def _indices(flow: kernel.OceanGrid | kernel.RisingOceanGrid, x: Array, y: Array) -> Array:
     """Return fractional grid indices (2, nx, ny) at places [m]; outside the grid they stay at its edge."""
     at = np.meshgrid((x - flow.extent.x_lo) * flow.per_x, (y - flow.extent.y_lo) * flow.per_y, indexing="ij")
     return np.stack([map_coordinates(flow.index_map[..., n], at, order=1, mode="nearest") for n in range(2)])

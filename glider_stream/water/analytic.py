@@ -328,7 +328,9 @@ class Upwelling(AnalyticFlow):
     def check(self) -> None:
         """Raise InputError if the flow stretches and has no sides."""
         bounded = self.stretch == 0 or self.x is not None
-        require(bounded, "`flow.x` must be given where `flow.stretch` is not 0: the speed grows with the distance")
+        require(
+            bounded, "`flow.x` must be given where `flow.stretch` is not 0: the speed grows with the distance"
+        )
 
     def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
         """Return the kernel's class and its fields."""
@@ -351,8 +353,8 @@ class Upwelling(AnalyticFlow):
 class Rolls(AnalyticFlow):
     """A row of convection cells: w = -w_max cos(pi (x - x_centre) / width) sin(pi z / depth), u by continuity.
 
-    Each cell is `width` [m] wide and `depth` [m] deep and turns against the ones beside it; `w` [m/s] is the
-    greatest vertical speed, upward (if above 0) in the middle of a cell at `x_centre`. u is at most w width / depth.
+    The water rises and sinks by turns every `width` [m]; `depth` [m] is that of the cells. `w` [m/s] is the
+    greatest vertical speed, upward at `x_centre`. u is at most w width / depth, at the surface and at the bottom.
     """
 
     w: float
@@ -372,11 +374,12 @@ class Rolls(AnalyticFlow):
 
 @dataclass(frozen=True)
 class InternalWave(AnalyticFlow):
-    """An internal wave that travels along x: w = -w_max cos(2 pi ((x - x_centre) / length - t / period)) sin(m z).
+    """An internal wave that travels along x: w = -w_max cos(2 pi (dx / length - t / period)) sin(m z).
 
-    m = pi mode / depth: at the surface and at `depth` [m] there is no vertical current. u and w come from one
-    stream function in the vertical plane, so the wave is free of divergence. `w` [m/s] is the greatest vertical
-    speed; the wave moves towards +x by its `length` [m] in a `period` [s]. u is at most w mode length / (2 depth).
+    dx = x - x_centre; m = pi mode / depth: at the surface and at `depth` [m] there is no vertical current. u and
+    w come from one stream function in the vertical plane, so the wave is free of divergence. `w` [m/s] is the
+    greatest vertical speed; the wave moves towards +x by its `length` [m] in a `period` [s]. u is at most
+    w mode length / (2 depth).
     """
 
     w: float
@@ -416,8 +419,9 @@ def _rolls(w: float, width: float, depth: float, x: float, drift: float) -> tupl
 class Abc(AnalyticFlow):
     """The flow of Arnold, Beltrami and Childress, whose paths are chaotic: a hard test.
 
-    u = a sin(kz) + c cos(ky), v = b sin(kx) + a cos(kz), w = c sin(ky) + b cos(kx) with k = 2 pi / length; a, b, c
-    [m/s], `length` [m].
+    u = a sin(kz) + c cos(ky), v = b sin(kx) + a cos(kz), w = c sin(ky) + b cos(kx); k = 2 pi / length.
+
+    `a`, `b`, `c` [m/s], `length` [m].
     """
 
     a: float
