@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .cache import in_kernels, inlined, kernel, making
-from .flow import by_rise, contains_box, rises
+from .flow import Array, Flow, by_rise, contains_box, rises
 from .motion import (
     LANE_ROWS,
     LANE_STEP,
@@ -111,7 +111,7 @@ def _count_down(flat):
         )
 
 
-def advance(flow, lanes):
+def advance(flow: Flow, lanes: Array) -> None:
     """Make one RK4 step of every lane in flight; a lane whose LANE_LEFT is 0 has ended."""
     _ADVANCE[rises(flow)](flow, lanes)
 

@@ -1,12 +1,12 @@
 """Motion: a constant velocity through water, carried by the flow; RK4, closest approach, the trace."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .cache import entry_point, in_kernels, inlined, kernel, making
-from .flow import by_rise, carry, contains, current, rises, velocity
+from .flow import Flow, by_rise, carry, contains, current, rises, velocity
 from .place import Place
 from .terrain import allowed, open_between
 
@@ -63,9 +63,10 @@ def _step_level(flow, at, through, dt):
     return x, y, at.z + dt * through.w
 
 
-def step_on(flow, at, through, dt):
+def step_on(flow: Flow, at: Place, through: Any, dt: float) -> tuple[float, float, float]:
     """One RK4 step in any flow, from a Place, with a velocity through water; returns x, y, z [m]."""
-    return _STEP[rises(flow)](flow, at, through, dt)
+    x, y, z = _STEP[rises(flow)](flow, at, through, dt)
+    return x, y, z
 
 
 def _step_rising(flow, at, through, dt):

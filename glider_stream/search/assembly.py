@@ -77,8 +77,8 @@ class Assembly:
             control = edge.glide_angle, edge.heading, edge.speed
             ends, track = self._lonlat(source, target), self._lonlat(*rows[:, 1:])
             north, lifted = self._north(source), self._lifted(edge, rows)
-            made = clock, edge.time, edge.miss, rows, ends, track, north, edge.cost, lifted
-            legs.append(Leg(source, target, *control, *made))
+            times = clock, edge.time, edge.miss
+            legs.append(Leg(source, target, *control, *times, rows, ends, track, north, edge.cost, lifted))
             clock += edge.time
         return self._titled(start, goal, self.cost(hops), tuple(legs))
 
