@@ -90,7 +90,7 @@ def fields() -> dict[str, tuple[Any, float, Evaluator]]:
 
 
 def rising_fields() -> dict[str, tuple[Any, float, Evaluator]]:
-    """The same of flows with a vertical part: up to half of the fastest sink, 0.78 m/s."""
+    """The same of flows with a vertical part: up to half of the fastest sink, 0.86 m/s."""
     box = IntegrationSettings(5.0, 125, 5.0)
     paper = polar(PRESETS["paper"])
     four, rng = [0.0, -100.0, -200.0, -300.0], np.random.default_rng(7)
@@ -99,11 +99,11 @@ def rising_fields() -> dict[str, tuple[Any, float, Evaluator]]:
     def judge(flow: Any) -> Evaluator:
         return Evaluator(flow, OpenWater(-math.inf), paper, FlowMapMethod(), box)
 
-    cells = Rolls(w=0.39, width=300.0, depth=300.0).kernel(DEPTHS)
-    wave = InternalWave(w=0.35, length=400.0, depth=300.0, period=900.0).kernel(DEPTHS)
-    chaotic = Abc(0.3, 0.2, 0.15, 500.0).kernel(DEPTHS)
+    cells = Rolls(w=0.43, width=300.0, depth=300.0).kernel(DEPTHS)
+    wave = InternalWave(w=0.43, length=400.0, depth=300.0, period=900.0).kernel(DEPTHS)
+    chaotic = Abc(0.3, 0.25, 0.18, 500.0).kernel(DEPTHS)
     sides = (-2200.0, 2200.0)
-    upwelling = Upwelling(0.1, 0.2, 0.0, stretch=-1e-3, x=sides).kernel(DEPTHS)
+    upwelling = Upwelling(0.1, 0.2, 0.0, stretch=-1.3e-3, x=sides).kernel(DEPTHS)
     return {
         "convection cells": (on_levels(11, 900, 450, four), 0.0, judge(cells)),
         "internal wave": (on_levels(12, 900, 450, four), 321.0, judge(wave)),

@@ -20,7 +20,7 @@ RADIUS = 6.371e6
 
 
 def with_w(**attrs):
-    """The small current file with a vertical current on levels of its own: it grows with depth, and toward east."""
+    """The small current file with a vertical current on its own levels, growing with depth and toward east."""
     data = dataset()
     depth, _, lon = np.meshgrid(LEVELS, data.lat, data.lon, indexing="ij")
     data["wo"] = (("depthw", "lat", "lon"), 1e-4 * depth * (1 + lon - 20.5), {"units": "m s-1"} | attrs)

@@ -64,21 +64,10 @@ TOWARD_EAST = re.compile(
 AXIS_NAMES = {
     "lon": {"lon", "longitude", "lons", "long", "nav_lon", "lon_rho", "lon_u", "lon_v", "lon_psi", "xlong"},
     "lat": {"lat", "latitude", "lats", "nav_lat", "lat_rho", "lat_u", "lat_v", "lat_psi", "xlat"},
-    "depth": {
-        "depth",
-        "depths",
-        "deptht",
-        "depthu",
-        "depthv",
-        "depthw",
-        "z",
-        "st_ocean",
-        "z_t",
-        "lev",
-        "level_depth",
-    },
+    "depth": {"depth", "depths", "deptht", "depthu", "depthv", "z", "st_ocean", "z_t", "lev", "level_depth"},
     "time": {"time", "times", "mt", "ocean_time", "time_counter", "date_time", "valid_time"},
 }
+AXIS_NAMES["depth"] |= {"depthw"}
 AXIS_NAMES["lon"] |= {"glamt", "glamu", "glamv", "glamf", "geolon", "geolon_c", "geolon_t", "geolon_u"}
 AXIS_NAMES["lon"] |= {
     "geolon_v",
