@@ -28,7 +28,7 @@ from ..base.arrays import Array, Bools, Index
 from ..base.settings import require
 from ..base.threads import threads
 from ..kernels.edges import COST, STATUS, TIME, Edge, Status
-from ..kernels.flow import max_rise, velocities
+from ..kernels.flow import velocities
 from ..roadmap.builder import Tally, build_roadmap, find_edges, roadmap_of
 from ..roadmap.neighbours import Reachable
 from ..roadmap.nodes import YoSampler, jittered
@@ -392,7 +392,7 @@ class Refiner:
         """Return the legs of a round, without legs that lead away from the goal or gain less than they cost."""
         evaluator, price = problem.evaluator, problem.evaluator.cost.kernel()
         position, integration = guess.position, evaluator.integration
-        sink = fastest_sink(evaluator.polar) + max_rise(evaluator.flow)
+        sink = fastest_sink(evaluator.polar, evaluator.flow)
         level = float(evaluator.polar.best_horizontal.max())
         unsure = DOUBT / FINER * max(cells.spacing / level, cells.rise / sink if cells.between else 0.0)
         current = velocities(evaluator.flow, *np.ascontiguousarray(position.T), guess.when)
