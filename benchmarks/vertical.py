@@ -28,8 +28,8 @@ from glider_stream.water.sampled import sample_flow
 FLIGHTS, STEPS, RUNS = 2048, 60, 7
 CELLS = (
     "flow.kind=convection-cells", "flow.w=0.3", "flow.width=300.0", "flow.depth=300.0",
-    "steering.method=flow-map", "neighbours.kind=reachable", "neighbours.limit=64", "sampling.kind=sobol", "sampling.count=1026",
-    "sampling.seed=1",
+    "steering.method=flow-map", "neighbours.kind=reachable", "neighbours.limit=64", "sampling.kind=sobol",
+    "sampling.count=1026", "sampling.seed=1",
 )  # fmt: skip
 
 

@@ -1,12 +1,24 @@
 """Flows with a vertical part: formulas, no divergence, bounds, grids, settings, and what refuses them."""
 
+import json
 import math
+import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.missions import MISSION
+from helpers.small import SCENARIO
 
 from glider_stream.base.errors import InputError
+from glider_stream.evaluation.baselines import straight
+from glider_stream.evaluation.level_set import bound
 from glider_stream.kernels.flow import RisingGrid, current, cycle, max_rise, rises, velocity
+from glider_stream.mission.settings import mission_from_table
+from glider_stream.mission.world import Worlds
+from glider_stream.scenario import read_scenario
+from glider_stream.search.flown_on import flown_on
+from glider_stream.search.path import Leg, Path, load_path
 from glider_stream.water.analytic import Abc, InternalWave, Rolls, Uniform, Upwelling
 from glider_stream.water.inspect import is_steady, require_level
 from glider_stream.water.sampled import sample_flow, sampling_error
@@ -94,3 +106,52 @@ def test_a_grid_holds_the_vertical_part_too():
 def test_settings_that_cannot_be_used_are_refused(make, why):
     with pytest.raises(InputError, match=why):
         make()
+
+
+CELLS = ("flow.kind=convection-cells", "flow.w=0.2", "flow.width=150.0", "flow.depth=300.0")
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return read_scenario("seed-box", CELLS).problem()
+
+
+def test_a_scenario_says_that_its_water_rises_and_what_the_line_foresees(problem):
+    rises = "with a vertical current of up to 0.2 m/s"
+    assert problem.flow_words.startswith("convection-cells, sampled")
+    assert f", {rises}, which the controls of this method do not foresee" in problem.flow_words
+    exact = read_scenario("seed-box", [*CELLS, "steering.method=flow-map"]).problem()
+    assert rises in exact.flow_words
+    assert "foresee" not in exact.flow_words
+
+
+@pytest.mark.parametrize("what", ["mission", "baseline", "rest of a plan", "2 dimensions"])
+def test_what_takes_no_vertical_current_refuses_it(problem, tmp_path, what):
+    (tmp_path / "small.toml").write_text(SCENARIO)
+    table = tomllib.loads(MISSION)
+    table["scenario"]["set"] += [*CELLS]
+    leg = Leg(problem.start, problem.goal, -0.5, 0.0, 1.0, 0.0, 100.0, 0.0, np.zeros((2, 4)))
+    path = Path(problem.start, problem.goal, 100.0, (leg,))
+    asked = {
+        "mission": lambda: Worlds(mission_from_table(table, tmp_path / "mission.toml")),
+        "baseline": lambda: straight(problem, problem.start, problem.goal),
+        "rest of a plan": lambda: flown_on(path, 0.0, problem.start, problem),
+        "2 dimensions": lambda: bound(problem, 2),
+    }
+    with pytest.raises(InputError, match="vertical current, and this flow has one"):
+        asked[what]()
+
+
+def test_a_path_file_keeps_how_far_the_water_lifted_the_glider(tmp_path):
+    start, end = np.array([0.0, 0.0, -10.0]), np.array([30.0, 0.0, -60.0])
+    rows = np.array([[0.0, *start], [100.0, *end]])
+    control = -math.asin(0.8), 0.0, 1.0
+    leg = Leg(start, end, *control, 0.0, 100.0, 0.0, rows, lifted=30.0)
+    path = Path(start, end, 100.0, (leg,))
+    (tmp_path / "path.json").write_text(json.dumps(path.as_dict()))
+    assert load_path(tmp_path / "path.json").legs[0].lifted == 30.0
+    assert "lifted 30.0 m" in str(path)
+    still = replace(path, legs=(replace(leg, lifted=0.0),))
+    (tmp_path / "path.json").write_text(json.dumps(still.as_dict()))
+    with pytest.raises(InputError, match="does not reach its depth in its time"):
+        load_path(tmp_path / "path.json")
