@@ -103,8 +103,11 @@ class Evaluator:
 
     @property
     def flies_backward(self) -> bool:
-        """Whether one fan that is flown back in time can find all legs to a point."""
-        return self.exact and is_steady(self.flow)
+        """Whether one fan that is flown back in time can find all legs to a point.
+
+        Not in a flow that rises: there a path may pass the depth of its start again, where the fan would end it.
+        """
+        return self.exact and is_steady(self.flow) and not flow.rises(self.flow)
 
     def by_fan(self) -> "Evaluator":
         """Return the same evaluator with steering by the flow map."""
