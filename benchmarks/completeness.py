@@ -199,8 +199,8 @@ def main() -> None:
             flush=True,
         )
     count = 3_000 if options.quick else 100_000
-    odd = ("convection cells", "internal wave") if options.rising else ("seed box", "double gyre, swinging")
-    odd = {name: odd_pairs(cases[name], count) for name in odd}
+    boxed = ("cells in a grid",) if options.rising else ("seed box", "double gyre, swinging")
+    odd = {name: odd_pairs(cases[name], count) for name in boxed if options.only in (None, name)}
     print(f"of {count:,} random pairs, degenerate ones among them, with a wrong status or NaN: {odd}")
     if options.output:
         options.output.write_text(json.dumps(record | {"odd_pairs": odd}, indent=1) + "\n")

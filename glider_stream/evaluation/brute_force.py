@@ -11,7 +11,7 @@ from ..kernels.flow import by_rise, contains, rises
 from ..kernels.motion import rk4_step, step_on
 from ..kernels.place import Place
 
-HALVINGS = 36
+HALVINGS = 30
 """A step is halved so often to find where a path crosses a depth in a flow that rises."""
 IN_WATER = 1e-3
 """A glider that the flow lifts higher than this [m] has left the water."""
@@ -113,7 +113,8 @@ def newton(flow, polar, direction, x, y, z, t, x_q, y_q, z_q, angle, heading, dt
 def miss_all(flow, c, position, source, target, order, t, dt, latest, off):
     """Write the distances [m] (targets,) between targets and one control's landings, in a flow that rises.
 
-    `order` (targets,): by how far their depths are away. inf where the control does not arrive.
+    `order` (targets,): by how far their depths are away. inf where the control does not arrive. A step is
+    shortened once, to where its chord crosses a depth: centimetres beside, which is enough to begin Newton's method.
     """
     off[:] = np.inf
     x, y, z = position[source]
@@ -128,7 +129,7 @@ def miss_all(flow, c, position, source, target, order, t, dt, latest, off):
                 break
             if z_q != crossed:
                 crossed = z_q
-                x_1, y_1, _ = cross(flow, here, c, dt, z_q)
+                x_1, y_1, _ = step_on(flow, here, c, dt * (z_q - here.z) / (z - here.z))
             off[order[at]] = math.hypot(x_1 - x_q, y_1 - y_q)
             at += 1
         n += 1
