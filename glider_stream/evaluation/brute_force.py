@@ -114,7 +114,7 @@ def miss_all(flow, c, position, source, target, order, t, dt, latest, off):
     """Write the distances [m] (targets,) between targets and one control's landings, in a flow that rises.
 
     `order` (targets,): by how far their depths are away. inf where the control does not arrive. A step is
-    shortened once, to where its chord crosses a depth: centimetres beside, which is enough to begin Newton's method.
+    shortened once, to where its chord crosses a depth: centimetres beside, enough to begin Newton's method.
     """
     off[:] = np.inf
     x, y, z = position[source]
