@@ -9,13 +9,17 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.threads import in_parallel
+from ..kernels.flow import rises
 from ..kernels.legs import fly_legs, legs_fit
+from ..kernels.steer import FLOWN
 from ..roadmap.evaluator import Evaluator
 
 LEGS_AT_ONCE = 1024
 """A thread flies this many legs at a time, which takes milliseconds; with fewer the threads' start costs more."""
 CLOSE = 1e-5
 """A leg that ends within this distance [m] of its stop is exact: hundreds of legs add up to a few millimetres."""
+AGREED = 1e-6
+"""Legs of a route in a flow that rises have found their times when these change by less [s]."""
 MOST_STEPS = 12
 """At most this many Newton steps are made from a guess; a near guess needs two or three."""
 PATIENCE = 2
@@ -75,23 +79,25 @@ class Air:
         angle, heading = angle.copy(), heading.copy()
         lowest, highest = self.limits(begin, end)
         left: Array | float = departs
+        flown: Array | None = None
         least, waited = np.full(len(angle), np.inf), np.zeros(len(angle), np.int64)
-        rows = self._three(begin, end[:, 2])
+        rows = np.empty((3, len(angle), 7))
+        rows[:, :, :T], rows[:, :, Z_END] = begin, end[:, 2]
         for _ in range(MOST_STEPS):
-            rows[:, :, ANGLE], rows[:, :, HEADING] = angle, heading
+            time = self._expected(begin, end, angle, flown)
+            if np.ndim(departs) == 0:
+                left = departs + np.concatenate([[0.0], np.cumsum(time)[:-1]])
+            rows[:, :, T], rows[:, :, ANGLE], rows[:, :, HEADING] = left, angle, heading
             rows[1, :, ANGLE] += self.steps[ANGLE]
             rows[2, :, HEADING] += self.steps[HEADING]
-            through, times = self._flights(rows.reshape(-1, 7))
-            time = times[: len(angle)]
-            if np.ndim(departs) == 0:
-                left = departs + np.cumsum(time) - time
-            rows[:, :, T] = left
-            ends = self._flown(rows, through, times)
+            landings = self._landings(rows)
+            ends, flown = landings[..., :2], landings[0, :, 2]
             off = end[:, :2] - ends[0]
             miss = np.hypot(off[:, 0], off[:, 1])
             waited = np.where(miss < 0.5 * least, 0, waited + 1)
             least = np.fmin(least, miss)
-            if ((miss <= CLOSE) | (waited >= PATIENCE)).all():
+            lost = (waited >= PATIENCE) & ~(miss <= CLOSE)
+            if ((miss <= CLOSE) | lost).all() and (lost.any() or self._settled(time, flown)):
                 break
             by_angle, by_heading = ((ends[1 + n] - ends[0]) / self.steps[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
@@ -108,20 +114,26 @@ class Air:
         """
         of, away = self._rows(begin, end, glides), np.diag(self.steps)[:, None, :]
         if one_sided:
-            ends = self._ends(np.concatenate([of[None], of + away]))
+            ends = self._landings(np.concatenate([of[None], of + away]))
             by = (ends[1:] - ends[0]) / self.steps[:, None, None]
         else:
-            ends = self._ends(np.concatenate([of + away, of - away]))
-            by = (ends[:7] - ends[7:]) / (2 * self.steps[:, None, None])  # (7, n, 2)
+            ends = self._landings(np.concatenate([of + away, of - away]))
+            by = (ends[:7] - ends[7:]) / (2 * self.steps[:, None, None])  # (7, n, 3)
+        by, later = by[..., :2], by[..., 2]
         # the leg must end at its stop, so the control undoes every other change of the leg's end
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
         angle, heading = np.moveaxis(_solve(by[ANGLE], by[HEADING], moved), (0, 2), (2, 0))
-        return Slopes(self._time_slopes(begin, end, glides, angle), angle, heading)
+        return Slopes(self._time_slopes(begin, end, glides, (angle, heading, later)), angle, heading)
 
-    def _time_slopes(self, begin: Array, end: Array, glides: Glides, angle: Array) -> Array:
-        """Return the derivatives (n, 7) of the times, from those of the controls `angle` (n, 7)."""
+    def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
+        """Return the derivatives (n, 7) of the times.
+
+        `by`: those of the controls, angle and heading (n, 7), and those of the flights' times (7, n) by the
+        columns of a leg's parameters.
+        """
+        angle = by[0]
         climbs = end[:, 2] > begin[:, 2]
         sinks = self.sinking(glides.angle, climbs)
         ahead, behind = (self.sinking(glides.angle + sign * STEPS[ANGLE], climbs) for sign in (1.0, -1.0))
@@ -164,7 +176,7 @@ class Air:
         """Return the speed V (n,) [m/s] at glide angles [rad], equal to `kernels.control.glide_speed`."""
         polar, way = self.evaluator.polar, climbs.astype(np.intp)
         last = polar.speed.shape[1] - 1
-        lowest, highest = polar.shallowest[way], polar.steepest[way]
+        lowest, highest = self.angles(climbs)
         at = np.minimum(np.maximum((angle - lowest) / (highest - lowest) * last, 0.0), last)
         below = np.minimum(at.astype(np.intp), last - 1)
         row, table = way * (last + 1) + below, polar.speed.ravel()
@@ -182,6 +194,14 @@ class Air:
         found[:, 0], found[:, 1] = along * np.cos(heading), along * np.sin(heading)
         found[:, 2] = speed * np.sin(angle) * np.where(climbs, 1.0, -1.0)
         return found
+
+    def _expected(self, begin: Array, end: Array, angle: Array, flown: Array | None) -> Array:
+        """Return the times (n,) [s] of legs that fly next; they took `flown` (n,) [s] before, if they flew."""
+        return self.times(begin, end, angle)
+
+    def _settled(self, expected: Array, flown: Array) -> bool:
+        """Return whether legs have taken the times that the departures of those after them count on."""
+        return True
 
     def times(self, begin: Array, end: Array, angle: Array) -> Array:
         """Return the times (n,) [s] of legs with glide angles (n,) [rad]."""
@@ -211,22 +231,43 @@ class Air:
 
     def _ends(self, of: Array) -> Array:
         """Return the ends x, y (m, n, 2) [m] of legs with parameters (m, n, 7)."""
-        return self._flown(of, *self._flights(of.reshape(-1, 7)))
+        return self._landings(of)[..., :2]
 
-    def _flown(self, of: Array, through: Array, time: Array) -> Array:
-        """Return what `_ends` does, from the velocities and times that `_flights` returns."""
-        start = np.ascontiguousarray(of.reshape(-1, 7)[:, : T + 1])
-        ends = np.full((len(start), 2), np.nan)
-        task = partial(fly_legs, self.evaluator.flow, start, through, time, self.evaluator.integration.dt, ends)
-        in_parallel(task, len(start), LEGS_AT_ONCE)
-        return ends.reshape(*of.shape[:2], 2)
+    def _landings(self, of: Array) -> Array:
+        """Return the ends and the times x, y [m], t [s] (m, n, 3) of legs with parameters (m, n, 7)."""
+        row = of.reshape(-1, 7)
+        through, time = self._flights(row)
+        start, height = np.ascontiguousarray(row[:, : T + 1]), np.ascontiguousarray(row[:, Z_END])
+        ends = np.full((len(row), 3), np.nan)
+        integration = self.evaluator.integration
+        longest = FLOWN * integration.dt * integration.steps
+        how = self.evaluator.flow, start, through, time, height, longest, integration.dt
+        in_parallel(partial(fly_legs, *how, ends), len(row), LEGS_AT_ONCE)
+        return ends.reshape(*of.shape[:2], 3)
 
-    @staticmethod
-    def _three(begin: Array, height: Array) -> Array:
-        """Return parameters (3, n, 7) of legs and two beside each, without departures and controls."""
-        rows = np.empty((3, len(begin), 7))
-        rows[:, :, :T], rows[:, :, Z_END] = begin, height
-        return rows
+
+@dataclass(frozen=True)
+class RisingAir(Air):
+    """Computes legs as `Air` does, in a flow with a vertical part: the times of legs are known after they fly."""
+
+    def _expected(self, begin: Array, end: Array, angle: Array, flown: Array | None) -> Array:
+        guess = self.times(begin, end, angle)
+        return guess if flown is None else np.where(np.isfinite(flown), flown, guess)
+
+    def _settled(self, expected: Array, flown: Array) -> bool:
+        return bool((np.abs(flown - expected) <= AGREED).all())
+
+    def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
+        angle, heading, later = by
+        time = later[ANGLE][:, None] * angle + later[HEADING][:, None] * heading
+        for column, parameter in ((0, X), (1, Y), (2, Z), (5, Z_END), (6, T)):
+            time[:, column] += later[parameter]
+        return np.asarray(time)
+
+
+def air_of(evaluator: Evaluator) -> Air:
+    """Return the object that computes legs in the water of an evaluator."""
+    return RisingAir(evaluator) if rises(evaluator.flow) else Air(evaluator)
 
 
 def _solve(by_first: Array, by_second: Array, off: Array) -> Array:
