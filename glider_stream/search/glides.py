@@ -23,7 +23,7 @@ AGREED = 1e-6
 MOST_STEPS = 12
 """At most this many Newton steps are made from a guess; a near guess needs two or three."""
 PATIENCE = 2
-"""A leg is given up after this many steps in a row that do not halve its least miss. Mostly it would have to be
+"""A leg is given up after this many whole steps in a row that do not halve its least miss. Mostly it would have to be
 steeper or shallower than the polar allows, and stays at that limit."""
 LONGEST_TURN = 0.3
 """A Newton step changes glide angle and heading by at most this [rad]; beyond it the linear model is wrong."""
@@ -81,6 +81,7 @@ class Air:
         left: Array | float = departs
         flown: Array | None = None
         least, waited = np.full(len(angle), np.inf), np.zeros(len(angle), np.int64)
+        limited = np.zeros(len(angle), np.bool_)
         rows = np.empty((3, len(angle), 7))
         rows[:, :, :T], rows[:, :, Z_END] = begin, end[:, 2]
         for _ in range(MOST_STEPS):
@@ -94,7 +95,7 @@ class Air:
             ends, flown = landings[..., :2], landings[0, :, 2]
             off = end[:, :2] - ends[0]
             miss = np.hypot(off[:, 0], off[:, 1])
-            waited = np.where(miss < 0.5 * least, 0, waited + 1)
+            waited = np.where((miss < 0.5 * least) | limited, 0, waited + 1)
             least = np.fmin(least, miss)
             lost = (waited >= PATIENCE) & ~(miss <= CLOSE)
             if ((miss <= CLOSE) | lost).all() and (lost.any() or self._settled(time, flown)):
@@ -104,6 +105,7 @@ class Air:
             turn[~np.isfinite(turn)] = 0.0
             longest = np.maximum(np.abs(turn[:, 0]) / self._longest(angle), np.abs(turn[:, 1]) / LONGEST_TURN)
             turn /= np.maximum(1.0, longest)[:, None]
+            limited = longest > 1.0
             angle, heading = np.clip(angle + turn[:, 0], lowest, highest), heading + turn[:, 1]
         return Glides(angle, heading, time, np.asarray(left), miss)
 
