@@ -23,8 +23,8 @@ AGREED = 1e-6
 MOST_STEPS = 12
 """At most this many Newton steps are made from a guess; a near guess needs two or three."""
 PATIENCE = 2
-"""A leg is given up after this many steps in a row, none of them shortened, that do not halve its least miss. Most
-would have to be steeper or shallower than the polar allows, and stay at that limit."""
+"""A leg is given up after this many steps in a row, none of them shortened, that do not halve its least miss.
+Most would have to be steeper or shallower than the polar allows, and stay at that limit."""
 LONGEST_TURN = 0.3
 """A Newton step changes glide angle and heading by at most this [rad]; beyond it the linear model is wrong."""
 X, Y, Z, T, Z_END, ANGLE, HEADING = range(7)
