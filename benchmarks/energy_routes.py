@@ -146,11 +146,12 @@ class Plane:
 
     def least(self) -> float:
         """The least energy [J] of all extremals that meet the goal."""
-        headings = np.linspace(-math.pi, math.pi, FAN, endpoint=False)
+        headings: Floats = np.linspace(-math.pi, math.pi, FAN, endpoint=False)
         near, _ = self.passes(headings)
         low = (near <= np.roll(near, 1)) & (near <= np.roll(near, -1)) & (near < NEAR)
-        best, span = headings[low], 2 * math.pi / FAN
-        cost = np.full(best.size, np.inf)
+        best: Floats = headings[low]
+        span = 2 * math.pi / FAN
+        cost: Floats = np.full(best.size, np.inf)
         for _ in range(ROUNDS):
             fans = best[:, None] + np.linspace(-span, span, FINER)
             near, cost = (values.reshape(fans.shape) for values in self.passes(fans.ravel()))
