@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -17,8 +18,7 @@ from ..vehicle.polar import glider_sha256
 from ..water.inspect import flow_sha256
 from .inputs import inputs_of, names_of
 from .problem import Problem
-from .roadmap import Provenance, Roadmap
-from .slices import SlicedRoadmap
+from .roadmap import Provenance
 
 _version = cache(version)
 """Returns the version of a package; it is cached, because it is read from files."""
@@ -52,7 +52,16 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
     )
 
 
-def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
+class Made(Protocol):
+    """Anything that was made by a build, such as a roadmap."""
+
+    @property
+    def provenance(self) -> Provenance:
+        """What made it."""
+        ...
+
+
+def check_unchanged(roadmap: Made, problem: Problem) -> None:
     """Raise InputError unless the roadmap was built with the problem's flow, terrain and glider."""
     made = roadmap.provenance
     for name, digest, now in (
