@@ -79,7 +79,7 @@ def test_the_walk_sees_what_is_imported():
     assert {"kernels.flow", "kernels.edges", "base.settings"} <= IMPORTS["roadmap.evaluator"]
     assert "water.frame" in IMPORTS["water.domain"]  # within a function
     assert IMPORTS["kernels.control"] == {"kernels.cache", "kernels.flow", "kernels.stream"}
-    assert "planner" in IMPORTS["cli"]
+    assert "planner" in IMPORTS["cli.roadmaps"]
     assert "kernels.cache" in IMPORTS["plot.water"]
     assert sum(map(len, IMPORTS.values())) > 60
 
