@@ -68,9 +68,7 @@ def earliest_arrivals(
     nodes, slices = arrival.size, departures.size
     # the nodes to look at next, soonest first; of equal ones the lower number
     waiting = [
-        (arrival[n] + least[n], n)
-        for n in range(nodes)
-        if not settled[n] and arrival[n] + least[n] < math.inf
+        (arrival[n] + least[n], n) for n in range(nodes) if not settled[n] and arrival[n] + least[n] < math.inf
     ]
     heapify(waiting)
     while len(waiting) > 0:

@@ -49,7 +49,7 @@ class EdgeRows:
 
     @classmethod
     def on_demand(cls, indptr: Index, block: int, source: EdgeSource) -> "EdgeRows":
-        """Return edges of which none is known yet. Memory is taken only by the parts of the arrays that are read."""
+        """Return edges of which none is known yet. Only the parts of the arrays that are read take memory."""
         edges = int(indptr[-1])
         known = np.zeros(-(-edges // block), np.bool_)
         return cls(indptr, np.empty(edges, np.int32), np.empty(edges), block, known, source)

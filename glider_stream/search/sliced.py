@@ -132,7 +132,12 @@ class _Query:
     """One query: its ends, and the exact legs that are known beside the slices."""
 
     def __init__(self, search: SliceSearch, start: Array, goal: Array, departure: float, learnt: _Learnt) -> None:
-        self.departures, self.rows, self.departure, self.learnt = search.departures, search.rows, departure, learnt
+        self.departures, self.rows, self.departure, self.learnt = (
+            search.departures,
+            search.rows,
+            departure,
+            learnt,
+        )
         self.start, self.goal = start, goal
         self.problem = replace(search.problem, departure=departure)
         self.position = position = search.position

@@ -33,7 +33,12 @@ def test_rows_are_read_once_and_as_they_are():
     source = Source()
     rows = EdgeRows.on_demand(source.indptr, BLOCK, source)
     assert not rows.known.any()
-    for wanted, following in ((np.array([3, 20]), 1), (np.array([3]), 2), (np.arange(30), 1), (np.array([29]), 2)):
+    for wanted, following in (
+        (np.array([3, 20]), 1),
+        (np.array([3]), 2),
+        (np.arange(30), 1),
+        (np.array([29]), 2),
+    ):
         rows.need(wanted, following)
         for row in wanted:
             edges = slice(source.indptr[row], source.indptr[min(row + following, 30)])
