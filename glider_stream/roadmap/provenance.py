@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from ..vehicle.polar import glider_sha256
 from ..water.inspect import flow_sha256
 from .inputs import inputs_of, names_of
 from .problem import Problem
-from .roadmap import Provenance
+from .roadmap import Made, Provenance
 
 _version = cache(version)
 """Returns the version of a package; it is cached, because it is read from files."""
@@ -50,15 +49,6 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
         libraries=", ".join(f"{name} {_version(name)}" for name in ("numpy", "numba", "scipy", "h5py")),
         machine=f"{platform.node()}, {platform.machine()}, Python {platform.python_version()}",
     )
-
-
-class Made(Protocol):
-    """Anything that was made by a build, such as a roadmap."""
-
-    @property
-    def provenance(self) -> Provenance:
-        """What made it."""
-        ...
 
 
 def check_unchanged(roadmap: Made, problem: Problem) -> None:

@@ -5,7 +5,7 @@ import hashlib
 import io
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -288,8 +288,8 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
 class StoredRoadmap:
     """A roadmap that stays in its `file`: its nodes `position` (n, 3) [m], and `rows` of edges, read when needed.
 
-    `departures` (slices,) [s] are those of its slices, None for a roadmap of one departure. `elsewhere`: see
-    `Roadmap`. Damage in a part that is never read is not found.
+    `departures` (slices,) [s] are those of its slices, None for a roadmap of one departure. `identity` is that of
+    the file when it was opened. `elsewhere`: see `Roadmap`. Damage in a part that is never read is not found.
     """
 
     position: Array
@@ -297,7 +297,21 @@ class StoredRoadmap:
     rows: EdgeRows
     provenance: Provenance
     file: Path
+    identity: tuple[int, ...]
     elsewhere: tuple[str, ...] = ()
+
+    def whole(self) -> Roadmap | SlicedRoadmap:
+        """Read all of it; InputError if it is damaged, or if the file is another one by now."""
+        _check_same(self.file, self.identity)
+        return replace(read_any_roadmap(self.file), elsewhere=self.elsewhere)
+
+
+def opened_roadmap(path: str | Path) -> Roadmap | StoredRoadmap:
+    """Read the file of a roadmap of one departure; a roadmap of several stays in its file."""
+    with _reading(Path(path)) as file:
+        _check_head(file, Path(path), FORMAT)
+        several = int(file.attrs["format_version"]) == SLICED_VERSION
+    return stored_roadmap(path) if several else read_roadmap(path)
 
 
 def stored_roadmap(path: str | Path) -> StoredRoadmap:
@@ -314,9 +328,9 @@ def stored_roadmap(path: str | Path) -> StoredRoadmap:
         for name in EDGE_FIELDS:
             fits = _declared(file, path, f"edges/{name}").shape == edges
             require(fits, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
-        source = _StoredEdges(path, _identity(path), len(position))
-        rows = EdgeRows.on_demand(indptr, CHUNK, source)
-        return StoredRoadmap(position, departures, rows, _provenance(file), path)
+        identity = _identity(path)
+        rows = EdgeRows.on_demand(indptr, CHUNK, _StoredEdges(path, identity, len(position)))
+        return StoredRoadmap(position, departures, rows, _provenance(file), path, identity)
     raise AssertionError  # never reached, because _reading raises
 
 
@@ -331,8 +345,7 @@ class _StoredEdges:
     def read(self, spans: Sequence[Span], target: NDArray[np.int32], time: Array) -> None:
         """Read targets and times of some spans; InputError if the file is another one by now."""
         with _reading(self.path) as file:
-            same = _identity(self.path) == self.identity
-            require(same, f"the roadmap {self.path} has been replaced since it was opened; open it again")
+            _check_same(self.path, self.identity)
             for first, last in spans:
                 target[first:last] = file["edges/target"][first:last]
                 time[first:last] = file["edges/time"][first:last]
@@ -352,6 +365,11 @@ def _identity(path: Path) -> tuple[int, ...]:
     """Return what changes if a file is replaced or written again."""
     stat = path.stat()
     return stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns
+
+
+def _check_same(path: Path, identity: tuple[int, ...]) -> None:
+    same = path.exists() and _identity(path) == identity
+    require(same, f"the roadmap {path} has been replaced since it was opened; open it again")
 
 
 def _names() -> list[str]:
