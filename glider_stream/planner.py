@@ -450,8 +450,8 @@ def bound(
     """Find the least time that a route of a scenario can take, by a level set, with its error.
 
     `nodes` along the longest side of the finer grid; in 2 `dimensions`, the mean current of a yo's depths, or 3;
-    None chooses 2 for long routes. `any_depth`: in 2 dimensions, the current of whichever depth is best, for a bound
-    where the mean is an estimate.
+    None chooses 2 for long routes. `any_depth`: in 2 dimensions, the current of whichever depth is best, which is
+    a bound where the mean is an estimate.
 
     Examples:
         >>> bound = planner.bound("small.toml", nodes=21)

@@ -344,8 +344,8 @@ class _StoredEdges:
 
     def read(self, spans: Sequence[Span], target: NDArray[np.int32], time: Array) -> None:
         """Read targets and times of some spans; InputError if the file is another one by now."""
-        with _reading(self.path) as file:
-            _check_same(self.path, self.identity)
+        _check_same(self.path, self.identity)  # so its links are checked already
+        with _errors_of(self.path), h5py.File(self.path, "r") as file:
             for first, last in spans:
                 target[first:last] = file["edges/target"][first:last]
                 time[first:last] = file["edges/time"][first:last]
@@ -418,13 +418,20 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
-    """Yield an open roadmap file; every error that h5py raises on a damaged file becomes an InputError."""
+    """Yield an open roadmap file after checks of its links; see `_errors_of`."""
     require(path.exists(), f"the roadmap {path} does not exist; build it first")
     check_file(path, "the roadmap")
-    try:
+    with _errors_of(path):
         check_links(path)
         with h5py.File(path, "r") as file:
             yield file
+
+
+@contextlib.contextmanager
+def _errors_of(path: Path) -> Iterator[None]:
+    """Turn every error that h5py raises on a damaged file into an InputError."""
+    try:
+        yield
     except (OSError, RuntimeError) as error:
         reason = "a checksum fails" if "filter" in str(error) else "it is no HDF5 file, or it is cut short"
         if isinstance(error, OSError) and error.errno:

@@ -30,7 +30,7 @@ BESIDE = 0.02
 """A leg may end a little beside its target. This saves at most this share of its time."""
 LAST_LEGS_AT_ONCE = 32
 """If the goal is not a node, the last legs from this many nodes are found together."""
-AHEAD = 64
+AHEAD = 512
 """When a search needs edges that are not read yet, they are read for this many nodes that come next."""
 
 
