@@ -89,7 +89,7 @@ def test_a_leg_from_end_to_end_is_looked_at(search):
 
 
 def test_a_roadmap_that_stays_in_its_file_gives_the_same_routes(search, tmp_path, monkeypatch):
-    """Bit by bit, though it reads only some edges; refused if the file is another one by now, or damaged there."""
+    """Bit by bit, though it reads only some edges; a file that was written since, or is damaged, is refused."""
     monkeypatch.setattr(store, "CHUNK", 256)
     monkeypatch.setattr(sliced_module, "AHEAD", 1)
     file, position = tmp_path / "slices.h5", sliced().position
