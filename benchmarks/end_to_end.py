@@ -14,15 +14,19 @@ import json
 import math
 import sys
 import time
-from pathlib import Path
+from dataclasses import replace
+from pathlib import Path as File
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from glider_stream.kernels.flow import Flow, velocity
-from glider_stream.roadmap.builder import node_positions
+from glider_stream.roadmap.builder import build_slices, node_positions
 from glider_stream.scenario import Scenario, read_scenario
+from glider_stream.search.path import Path
+from glider_stream.search.slice_planner import SlicePlanner
+from glider_stream.search.sliced import SliceSearch
 from glider_stream.search.time_dependent import ClockPlanner
 
 GYRE = "swinging-gyre"
@@ -37,6 +41,10 @@ ANALYTIC = {
     "tidal strait": ("tidal-strait", ["sampling.shape=[15,6,4]"]),
     "moving vortex": ("moving-vortex", ["sampling.shape=[12,8,4]"]),
 }
+
+
+SLICED = "galicia, by slices"
+"""The same route by a roadmap of six slices, six hours apart."""
 
 
 def replayed(flow: Flow, path: dict[str, Any], *, rtol: float = 1e-9) -> np.ndarray:
@@ -68,10 +76,13 @@ def one_route(
     """A route planned and flown: legs, hours, how far it ends from the goal and its legs from their nodes [m]."""
     problem = scenario.problem()
     path = ClockPlanner(problem, nodes, frozen=frozen).query(start, goal)
-    if not path.found or not path.legs:
-        return None
+    return flown(problem.evaluator.flow, path) if path.found and path.legs else None
+
+
+def flown(flow: Flow, path: Path) -> dict[str, Any]:
+    """What a route comes to that is flown from end to end with what it exports."""
     text = json.loads(json.dumps(path.as_dict()))
-    places = replayed(problem.evaluator.flow, text)
+    places = replayed(flow, text)
     stops = np.array([leg["to"] for leg in text["legs"]])
     return {
         "legs": len(stops),
@@ -129,6 +140,19 @@ def file_route(name: str, scenario: Scenario) -> dict[str, Any]:
     return summary(name, [row]) | {"wall_s": round(wall, 1), "expanded": moving["expanded"]}
 
 
+def sliced_route(name: str, scenario: Scenario, every: float, count: int) -> dict[str, Any]:
+    """The scenario's own route by a roadmap of slices, `every` [s] one."""
+    problem = scenario.problem()
+    problem = replace(problem, slices=tuple(problem.departure + every * np.arange(count)))
+    began = time.perf_counter()
+    road = build_slices(problem)
+    built = time.perf_counter() - began
+    path = SlicePlanner(problem, SliceSearch(road, problem)).query()
+    row = flown(problem.evaluator.flow, path)
+    kept = {"slices": count, "built_s": round(built, 1), "notes": list(path.notes)}
+    return summary(name, [row | {"frozen_miss_m": None}]) | kept
+
+
 def washington(file: str) -> Scenario:
     """Two days along the coast in a three-hourly forecast: its currents outrun the glider, which drifts about."""
     return read_scenario("ionian", [
@@ -167,7 +191,7 @@ def main() -> None:
     parser.add_argument("--washington", metavar="FILE", help="the real three-hourly file")
     parser.add_argument("--galicia", metavar="FILE", help="the real daily file")
     parser.add_argument("--only", action="append", help="a flow of the table; again for more")
-    parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("-o", "--output", type=File)
     args = parser.parse_args()
     found = []
     for seed, (name, (scenario, sets)) in enumerate(ANALYTIC.items()):
@@ -182,6 +206,9 @@ def main() -> None:
         if file is not None and (args.only is None or name in args.only):
             found.append(file_route(name, make(file)))
             print(found[-1], file=sys.stderr, flush=True)
+    if args.galicia is not None and (args.only is None or SLICED in args.only):
+        found.append(sliced_route(SLICED, galicia(args.galicia), 21_600.0, 6))
+        print(found[-1], file=sys.stderr, flush=True)
     text = json.dumps({"command": " ".join(["python", *sys.argv]), "flows": found}, indent=1)
     if args.output:
         args.output.write_text(text + "\n")

@@ -4,9 +4,10 @@
 
 Scenario n is made from the seed n alone. Of each: no crash and no NaN; the same bits for any threads, batches
 and shards; every edge within its tolerance when DOP853 flies it; every query as cheap as Dijkstra's algorithm of
-networkx finds it in the file. The log has a line for each scenario; the same command goes on where it stopped.
-Exit code 1 if one ever broke a promise. The first `COMMON` use one kind of flow in the kernels, so that tests
-compile little.
+networkx finds it in the file. In a flow that changes, a route of exact legs that DOP853 flies from end to end
+meets its goal, and a roadmap in memory and one that stays in its file give the same route. The log has a line for
+each scenario; the same command goes on where it stopped. Exit code 1 if one ever broke a promise. The first
+`COMMON` use one kind of flow in the kernels, so that tests compile little.
 """
 
 import argparse
@@ -21,21 +22,27 @@ from pathlib import Path
 import h5py
 import networkx
 import numpy as np
+from end_to_end import replayed
 
 from glider_stream.base.errors import InputError
 from glider_stream.jobs.build import Job, build_file, merge
 from glider_stream.jobs.build import Shard as Part
 from glider_stream.roadmap import verify
-from glider_stream.roadmap.store import read_roadmap
+from glider_stream.roadmap.slices import SlicedRoadmap
+from glider_stream.roadmap.store import read_any_roadmap, stored_roadmap
 from glider_stream.roadmap.verify import MOST_OFF, replayed_misses
 from glider_stream.scenario import scenario_from_table
+from glider_stream.search.answer import clock_planner, planner_of
 from glider_stream.search.query import Planner
+from glider_stream.search.surfacing import Surfacing
 from glider_stream.water.inspect import is_steady
 
 verify.LEGS_AT_ONCE = 500  # a step costs the same for one leg and for many
 COMMON = 30
 MEMORY = Path("/dev/shm")
 """Files are made here where the system has it: a disk that must keep each of them is slow."""
+OFF = 1.0
+"""A route of exact legs in a flow that changes ends at most so far from its goal [m]."""
 GOALS = 6
 """Goals that are asked for in each roadmap, from one start."""
 
@@ -49,8 +56,9 @@ def made(number):
     nodes = int(dice.integers(6, 24 if few else 60))
     tolerance, steps = float(dice.uniform(3, 12)), int(dice.integers(60, 140))
     method = pick("surface", "streamline", "refine", "flow-map", "flow-map", "reachable")
+    flow = _flow(dice, pick, side, deep, few)
     return {
-        "flow": _flow(dice, pick, side, deep, few),
+        "flow": flow,
         "glider": {"preset": "paper" if few else pick("paper", "slocum", "seaglider")},
         "domain": {"x": [-side, side], "y": [-side, side], "z": [-deep, 0.0]},
         "sampling": _sampling(dice, pick, nodes, deep, side),
@@ -60,11 +68,27 @@ def made(number):
         "cost": pick(
             {"kind": "time"}, {"kind": "energy", "preset": "slocum", "trim": float(dice.uniform(0, 20))}
         ),
+        **({} if few else _departures(dice, pick, flow)),
     }
 
 
+def _changes(flow):
+    """Whether a table of a flow is one that changes with time."""
+    drifts = any("drift" in vortex for vortex in flow.get("vortex", []))
+    return drifts or flow["kind"] == "tidal-jet" or flow.get("epsilon", 0.0) > 0
+
+
+def _departures(dice, pick, flow):
+    """Slices, in half of the flows that change; the flow's times hold all of them."""
+    every, count = float(dice.uniform(50, 900)), int(dice.integers(0, 4))
+    if not _changes(flow) or dice.random() < 0.5 or every * count > flow.get("times", [0.0, math.inf])[1]:
+        return {}
+    return {"departures": {"first": 0.0, "last": every * count, "every": every}}
+
+
 def _flow(dice, pick, side, deep, few):
-    kind = pick("uniform", "vortices", "vortices", "single-gyre", "rankine", "jet", "double-gyre")
+    kinds = "uniform", "vortices", "vortices", "single-gyre", "rankine", "jet", "double-gyre"
+    kind = pick(*kinds) if few else pick(*kinds, "double-gyre", "tidal-jet", "tidal-jet")
     speed = float(pick(0.0, 1e-6, 1e-3, *dice.uniform(0.01, 1.2, 4)) * pick(-1, 1))
     if kind == "double-gyre" and few:
         kind = "single-gyre"
@@ -81,11 +105,21 @@ def _flow(dice, pick, side, deep, few):
             "radius": float(dice.uniform(80, 300)), "speed": speed,
         },
         "jet": lambda: {"y_centre": 0.0, "width": float(dice.uniform(200, 600)), "speed": speed},
+        "tidal-jet": lambda: {
+            "y_centre": 0.0, "width": float(dice.uniform(200, 600)), "speed": speed,
+            "period": float(dice.uniform(600, 44_714)), "peak": float(dice.uniform(-3000, 3000)),
+        },
     }[kind]()  # fmt: skip
-    # a kink of these fields, and a swing in time, are no matter of a grid
+    if kind == "vortices" and not few and dice.random() < 0.5:
+        for vortex in table["vortex"]:
+            vortex["drift"] = dice.uniform(-0.4, 0.4, 2).tolist()
+    flow = {"kind": kind, **table}
+    if _changes(flow):
+        return flow | ({"times": [0.0, float(dice.uniform(200, 4000))]} if dice.random() < 0.5 else {})
+    # a kink of these fields is no matter of a grid
     even = kind not in ("double-gyre",)
     sampled = {"sampled": [25.0, 25.0, 25.0]} if even and (few or dice.random() < 0.4) else {}
-    return {"kind": kind, **table, **sampled}
+    return flow | sampled
 
 
 def _vortex(dice, side, deep):
@@ -137,7 +171,7 @@ def broken(number, folder):
     problem = scenario_from_table(made(number), folder).problem()
     file = folder / f"{number}.h5"
     build_file(problem, file, 1)
-    road = read_roadmap(file)
+    road = read_any_roadmap(file)
     others = {"threads and batches": folder / "batches.h5", "shards": folder / "shards.h5"}
     build_file(problem, others["threads and batches"], batch_pairs=int(3 + number % 50))
     parts = [folder / f"part{n}.h5" for n in (1, 2)]
@@ -149,9 +183,21 @@ def broken(number, folder):
             return f"{what} change bits", road.target.size
     if not all(np.isfinite(value).all() for value in values_of(road)):
         return "a value is not finite", road.target.size
-    if sum(road.counts.values()) != int(road.node_counts.sum()) or road.counts["connected"] != road.target.size:
+    sliced = isinstance(road, SlicedRoadmap)
+    by_row = road.row_counts if sliced else road.node_counts
+    if sum(road.counts.values()) != int(by_row.sum()) or road.counts["connected"] != road.target.size:
         return "the pairs are not counted", road.target.size
-    return flown_wrong(problem, road) or asked_wrong(problem, road, number), road.target.size
+    wrong = clock_wrong(problem, road, number) if not is_steady(problem.evaluator.flow) else ""
+    if sliced:
+        slices = enumerate(road.departures)
+        wrong = wrong or next(filter(None, (flown_wrong(leaving(problem, t), road.at(n)) for n, t in slices)), "")
+        return wrong, road.target.size
+    return wrong or flown_wrong(problem, road) or asked_wrong(problem, road, number), road.target.size
+
+
+def leaving(problem, departure):
+    """The problem at another departure [s]."""
+    return problem.leaving(float(departure) - problem.departure)
 
 
 def datasets(path):
@@ -184,6 +230,24 @@ def flown_wrong(problem, road):
     worst = int(np.argmax(misses))
     if not misses[worst] <= (1 + MOST_OFF) * tolerance:
         return f"edge {worst} misses by {misses[worst]:.3g} m, the tolerance is {tolerance:.3g} m"
+    return ""
+
+
+def clock_wrong(problem, road, number):
+    """Whether a route with the clock running misses its goal, or the roadmap's file gives another one."""
+    dice, whole = np.random.default_rng(number), planner_of(problem, road, Surfacing())
+    by_file = clock_planner(problem, stored_roadmap(road.file), Surfacing())
+    start, goals = int(dice.integers(len(road.position))), dice.integers(len(road.position), size=2)
+    for goal in goals:
+        ends = road.position[start], road.position[goal]
+        path, other = (planner.query(*ends) for planner in (whole, by_file))
+        if path.as_dict() != other.as_dict():
+            return f"the route from {start} to {goal} is another one by the roadmap's file"
+        if not path.legs or not problem.evaluator.exact:
+            continue
+        away = float(np.linalg.norm(replayed(problem.evaluator.flow, path.as_dict())[-1] - ends[1]))
+        if not away <= OFF:
+            return f"the route from {start} to {goal} ends {away:.3g} m from its goal"
     return ""
 
 

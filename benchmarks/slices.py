@@ -61,7 +61,7 @@ def compare(problem, position, every):
 def ask(planner, count, compared, reserve):
     """Queries between random nodes at random departures: seconds each; some flown, and compared."""
     random = np.random.default_rng(0)
-    road = planner.slices.roadmap
+    road = planner.slices
     planner.query(road.position[-2], road.position[-1])
     took, missed, slower, alone = [], [], [], []
     for number in range(count):

@@ -4,6 +4,9 @@ Every problem that has a path is solved as it is shipped, with exact legs; legs 
 the last one arrives. No route may be faster than the problem's bound in data/references.json.
 
     python benchmarks/suite_routes.py -o benchmarks/records/suite_routes.json
+    python benchmarks/suite_routes.py --routes benchmarks/records/suite_routes.json -o ...
+
+With `--routes` the routes are those of an earlier record, compared with the bounds and references of today.
 """
 
 import argparse
@@ -34,14 +37,10 @@ ROUNDING = 0.02
 def routes(name: str, known: Reference) -> dict[str, Any]:
     """One problem's routes: travel time [s], legs, processor time [s], over bound and over reference."""
     problem = open_scenario(name, [LAW, "steering.method=flow-map"])
-    assert known.bound is not None
-    assert known.seconds is not None
     row: dict[str, Any] = {
         "problem": name,
         "changes": not is_steady(problem.problem.evaluator.flow),
         "nodes": len(problem.position),
-        "bound_s": known.bound,
-        "reference_s": known.seconds,
     }
     for way, asked in WAYS.items():
         began = time.process_time()
@@ -49,12 +48,23 @@ def routes(name: str, known: Reference) -> dict[str, Any]:
         row[way] = {
             "travel_time_s": round(path.travel_time, 2),
             "legs": len(path.legs),
-            "over_bound": round(path.travel_time / known.bound, 4),
-            "over_reference": round(path.travel_time / known.seconds, 4),
             "processor_s": round(time.process_time() - began, 2),
-            "faster_than_bound": path.travel_time < known.bound - ROUNDING,
         }
-    return row
+    return compared(row, known)
+
+
+def compared(row: dict[str, Any], known: Reference) -> dict[str, Any]:
+    """One problem's routes beside its bound and its reference."""
+    assert known.bound is not None
+    assert known.seconds is not None
+    for way in WAYS:
+        seconds = row[way]["travel_time_s"]
+        row[way] |= {
+            "over_bound": round(seconds / known.bound, 4),
+            "over_reference": round(seconds / known.seconds, 4),
+            "faster_than_bound": seconds < known.bound - ROUNDING,
+        }
+    return row | {"bound_s": known.bound, "reference_s": known.seconds}
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -74,14 +84,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", action="append", help="a problem; again for more")
     parser.add_argument("-o", "--output", type=Path, help="a JSON file to keep the result in")
+    parser.add_argument("--routes", type=Path, help="a record whose routes are compared, instead of solving")
     args = parser.parse_args()
-    rows = []
-    with threads(None) as count:
-        for name, known in references().items():
-            if known.seconds is not None and (not args.only or name in args.only):
-                rows.append(routes(name, known))
-                print(rows[-1], file=sys.stderr, flush=True)
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"
+    known = {name: one for name, one in references().items() if one.seconds is not None}
+    if args.routes:
+        record = json.loads(args.routes.read_text())
+        machine, rows = record["machine"], [compared(row, known[row["problem"]]) for row in record["routes"]]
+    else:
+        rows = []
+        with threads(None) as count:
+            for name, one in known.items():
+                if not args.only or name in args.only:
+                    rows.append(routes(name, one))
+                    print(rows[-1], file=sys.stderr, flush=True)
+        machine = (
+            f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"
+        )
     result = {"machine": machine, "summary": summary(rows), "routes": rows}
     text = json.dumps(result, indent=1)
     if args.output:

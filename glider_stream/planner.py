@@ -444,12 +444,14 @@ def bound(
     overrides: Sequence[str] = (),
     nodes: int | None = None,
     dimensions: int | None = None,
+    any_depth: bool = False,
     progress: Callable[[str], None] = lambda line: None,
 ) -> "Bound":
     """Find the least time that a route of a scenario can take, by a level set, with its error.
 
     `nodes` along the longest side of the finer grid; in 2 `dimensions`, the mean current of a yo's depths, or 3;
-    None chooses 2 for long routes.
+    None chooses 2 for long routes. `any_depth`: in 2 dimensions, the current of whichever depth is best, which is
+    a bound where the mean is an estimate.
 
     Examples:
         >>> bound = planner.bound("small.toml", nodes=21)
@@ -459,7 +461,7 @@ def bound(
     from .evaluation.level_set import bound
 
     resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
-    return bound(resolved.problem(), dimensions, nodes, progress)
+    return bound(resolved.problem(), dimensions, nodes, progress, any_depth)
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:

@@ -23,8 +23,7 @@ from .roadmap.inputs import KEYS, located, names_of, renamed
 from .roadmap.neighbours import NEIGHBOURS, NeighbourLaw, Reachable
 from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
-from .roadmap.roadmap import Roadmap
-from .roadmap.slices import SlicedRoadmap
+from .roadmap.roadmap import Made
 from .roadmap.steering import METHODS, FlowMapMethod, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
@@ -376,7 +375,7 @@ def with_currents(scenario: Scenario, currents: Sequence[str | Path], query: Map
     return scenario_from_table(table, Path())
 
 
-def scenario_of(road: Roadmap | SlicedRoadmap) -> Scenario:
+def scenario_of(road: Made) -> Scenario:
     """Return the scenario that a roadmap holds; its files are found again if they or the roadmap have moved."""
     text = road.provenance.scenario
     try:

@@ -36,10 +36,21 @@ def corrected(when, early, time_early, late, time_late, learnt, times, first, la
     return time_between(when, early, time_early, late, time_late)
 
 
+@kernel
+def all_known(known, block, first, last):
+    """Whether all blocks that hold the edges from `first` to before `last` are known."""
+    n = first // block
+    while n * block < last:
+        if not known[n]:
+            return False
+        n += 1
+    return True
+
+
 @entry_point(nogil=True)
 def earliest_arrivals(
-    departures, indptr, target, time, learnt_first, learnt_target, learnt, learnt_time, goal, least, latest,
-    arrival, before,
+    departures, indptr, target, time, block, known, learnt_first, learnt_target, learnt, learnt_time, goal, least,
+    latest, arrival, before, settled,
 ):  # fmt: skip
     """A* with the clock running: from the nodes whose `arrival` (nodes,) [s] is finite.
 
@@ -49,18 +60,23 @@ def earliest_arrivals(
     the goal at the least, never less after a leg by more than the leg takes; nodes from which it cannot be
     reached by `latest` [s] are left out. Fills `arrival` and `before`, the node of each last leg; ends at
     the node `goal`, at none where it is -1. Exact where who leaves earlier does not arrive later.
+
+    Of the edges only the blocks of `block` edges are read that are `known` (blocks,). Returns -1 at the end, or a
+    node whose legs lie in another block: with that block known, the same arrays and `settled` (nodes,), which
+    begins as false, the next call goes on as if all had been known from the start.
     """
     nodes, slices = arrival.size, departures.size
     # the nodes to look at next, soonest first; of equal ones the lower number
-    waiting = [(arrival[n] + least[n], n) for n in range(nodes) if arrival[n] + least[n] < math.inf]
+    waiting = [
+        (arrival[n] + least[n], n) for n in range(nodes) if not settled[n] and arrival[n] + least[n] < math.inf
+    ]
     heapify(waiting)
-    settled = np.zeros(nodes, np.bool_)
     while len(waiting) > 0:
         node = heappop(waiting)[1]
         if settled[node]:
             continue
-        settled[node] = True
         if node == goal:
+            settled[node] = True
             break
         when = arrival[node]
         k = min(max(np.searchsorted(departures, when, side="right") - 1, 0), slices - 1)
@@ -68,6 +84,9 @@ def earliest_arrivals(
         when_there = max(when, early)  # before the first departure as at it
         a, a_last = indptr[node * slices + k], indptr[node * slices + k + 1]
         b, b_last = a_last, indptr[node * slices + k + 2] if k + 1 < slices else a_last
+        if not all_known(known, block, a, b_last):
+            return node
+        settled[node] = True
         while a < a_last or b < b_last:
             to = min(target[a] if a < a_last else nodes, target[b] if b < b_last else nodes)
             time_early, time_late = math.inf, math.inf
@@ -89,3 +108,4 @@ def earliest_arrivals(
             if when + takes < arrival[to] and when + takes + least[to] <= latest:
                 arrival[to], before[to] = when + takes, node
                 heappush(waiting, (when + takes + least[to], to))
+    return -1

@@ -101,7 +101,7 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
         raise AssertionError("work was begun")
 
     monkeypatch.setattr(planner, "build_roadmap", work)
-    monkeypatch.setattr(opening, "read_any_roadmap", work)
+    monkeypatch.setattr(opening, "opened_roadmap", work)
     with pytest.raises(InputError, match="make it first"):
         planner.build(scenario_file(tmp_path), tmp_path / "none" / "out.h5")
     with pytest.raises(InputError, match="make it first"):

@@ -217,9 +217,17 @@ def _route(opened: "Callable[[], OpenedScenario]", as_card: bool, given: dict[st
 @click.option(
     "--dimensions", type=int, help="2: the mean current of a yo's depths; 3: all depths; 2 for long routes."
 )
+@click.option(
+    "--any-depth", is_flag=True, help="In 2-D, the current of whichever depth is best: a bound, no estimate."
+)
 @JSON
 def bound(
-    scenario: str, overrides: tuple[str, ...], nodes: int | None, dimensions: int | None, as_json: bool
+    scenario: str,
+    overrides: tuple[str, ...],
+    nodes: int | None,
+    dimensions: int | None,
+    any_depth: bool,
+    as_json: bool,
 ) -> None:
     """Find the least time that a route of SCENARIO can take, by a level set, with its error."""
     from .. import planner
@@ -229,6 +237,7 @@ def bound(
         overrides=overrides,
         nodes=nodes,
         dimensions=dimensions,
+        any_depth=any_depth,
         progress=lambda line: say(f"bound: {line}", error=True),
     )
     show(found, as_json)

@@ -5,7 +5,8 @@ slower. The set that such a glider can have reached is a front: V_t + max over t
 moves it, with f the current and the speed through water (Osher and Sethian 1988; WENO5, local Lax-Friedrichs, TVD
 Runge-Kutta 3). In three dimensions glide angles lie on the polar or between two of its points. In two, for long
 routes of equal yos, the glider moves at its best horizontal speed in the mean current of the depths of a yo: that
-is what yos meet from one surfacing to the next, and an estimate, since a current varies along a yo.
+is what yos meet from one surfacing to the next, and an estimate, since a current varies along a yo. Where it does
+not vary with depth, or where the front may take the current of any depth at any time, it is a bound.
 
 - Start. The front does not begin at a point, which no grid shows, but at the set that a glider needs tau [s] to
   cross in still water. V is that time, as sqrt(tau^2 + SOFT^2) - SOFT with SOFT = tau: it moves alike, and has no
@@ -43,7 +44,9 @@ NEAR, PARTS = 1.25, 5
 COURANT = 0.6
 SLOPES = 512
 HEIGHTS = 25
-"""Heights at which the mean current of a yo is read."""
+"""Heights at which the mean current of a yo, or the current of any depth, is read."""
+EVEN = 1e-9
+"""A current that differs by less than this [m/s] from one depth to another does not vary with depth."""
 LONG = 10.0
 """A route of so many legs at the fastest glide is long: it is bounded in two dimensions."""
 NODES = {2: 101, 3: 61}
@@ -59,7 +62,7 @@ class Bound:
     """The least `time` [s] from start to goal on the finer grid, its `error` [s] the difference to the coarser.
 
     `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each. `frozen`: the front moves in the current of
-    the departure, though the flow changes.
+    the departure, though the flow changes. `sound`: the current is that of all depths, no mean of several.
     """
 
     time: float
@@ -67,6 +70,7 @@ class Bound:
     dimensions: int
     spacing: tuple[float, ...]
     frozen: bool = False
+    sound: bool = True
 
     @property
     def least(self) -> float:
@@ -81,12 +85,12 @@ class Bound:
             "least_s": self.least,
             "dimensions": self.dimensions,
             "spacing_m": list(self.spacing),
-            "kind": "estimate" if self.dimensions == 2 else "bound",
+            "kind": "bound" if self.sound else "estimate",
             **({"frozen": True} if self.frozen else {}),
         }
 
     def __str__(self) -> str:
-        where = "in the mean current of a yo's depths, an estimate" if self.dimensions == 2 else "in all depths"
+        where = "in all depths" if self.sound else "in the mean current of a yo's depths, an estimate"
         grid = " x ".join(f"{step:,.0f}" for step in self.spacing)
         return (
             f"no route takes less than {span(self.least)}: a level set {where}, arrives after "
@@ -99,11 +103,12 @@ class Waters:
     """What a level set reads of a problem: the flow, two ends, the box [m], and the polar's hull.
 
     `support` (SLOPES + 1,) is the greatest (1 - a) Vh + a w [m/s] for a from 0 to 1; `fastest`, `steepest`: the
-    greatest Vh, w.
+    greatest Vh, w. With `any_depth`, in two dimensions, the front has the currents of all depths to choose from.
     """
 
-    def __init__(self, problem: Problem, dimensions: int) -> None:
+    def __init__(self, problem: Problem, dimensions: int, any_depth: bool = False) -> None:
         """InputError where the scenario names no start and goal, or the box has no end."""
+        self.any_depth = any_depth and dimensions == 2
         require(problem.start is not None, "the scenario has no [query]: it names the start and the goal; add it")
         assert problem.start is not None
         assert problem.goal is not None
@@ -145,6 +150,21 @@ class Waters:
             z = np.full(len(at), low + (n + 0.5) / HEIGHTS * (high - low))
             total += velocities(self.flow, x, y, z, when)
         return total / HEIGHTS
+
+    def choices(self, at: Array, since: float) -> Array:
+        """Currents (depths, n, 2 or 3) [m/s] to choose from at points (n, 2 or 3); one, unless `any_depth`."""
+        if not self.any_depth:
+            return self.current(at, since)[None]
+        when = np.full(len(at), self.departure + (0.0 if self.steady else since))
+        x, y = (np.ascontiguousarray(at[:, n]) for n in range(2))
+        low, high = self.depths
+        heights = np.linspace(low, high, HEIGHTS)
+        return np.array([velocities(self.flow, x, y, np.full(len(at), z), when) for z in heights])
+
+    def varies(self, at: Array, since: float) -> bool:
+        """Whether the current at points (n, 2) varies with depth."""
+        known = Waters(self.problem, 2, any_depth=True).choices(at, since)
+        return bool((np.ptp(known, axis=0) > EVEN).any())
 
     def land(self, at: Array) -> NDArray[np.bool_]:
         """Which points (n, 2 or 3) no glider can be at."""
@@ -224,7 +244,8 @@ class Front:
         for share in np.linspace(0.0, 1.0, PARTS):
             away = self.nodes - end - sign * share * self.tau * across
             near = self.nodes[waters.still_water_time(away) <= NEAR * self.tau]
-            seen.append(waters.current(np.vstack([near, end]), share * self.tau))
+            found = waters.choices(np.vstack([near, end]), share * self.tau)
+            seen.append(found.reshape(-1, found.shape[2]))
         known = np.vstack(seen)
         carried = 0.5 * (known.min(axis=0) + known.max(axis=0))
         off = float(np.hypot(*(known - carried)[:, :2].T).max()) / waters.fastest
@@ -248,7 +269,7 @@ class Front:
         while now < latest:
             if not waters.steady:
                 current = self._current(now)
-            speeds = [most[n] + np.abs(part) for n, part in enumerate(current)]
+            speeds = [most[n] + np.abs(part).max(axis=0) for n, part in enumerate(current)]
             rate = sum(float(speed.max()) / step for speed, step in zip(speeds, self.step, strict=True))
             ahead = COURANT / rate
             values = self._moved(values, ahead, current, speeds)
@@ -259,10 +280,14 @@ class Front:
         return math.inf
 
     def _current(self, since: float) -> list[Array]:
-        """The current along each dimension at the nodes; against it where the front comes from the goal."""
+        """The currents to choose from along each dimension at the nodes, (depths, *shape).
+
+        They are against the flow where the front comes from the goal.
+        """
         sign = -1.0 if self.backward else 1.0
-        parts = [part.reshape(self.shape) for part in sign * self.waters.current(self.nodes, since).T]
-        return parts if len(self.shape) == len(parts) else [*parts, np.zeros(self.shape)]
+        found = sign * self.waters.choices(self.nodes, since)
+        parts = [found[:, :, n].reshape(-1, *self.shape) for n in range(found.shape[2])]
+        return parts if len(self.shape) == len(parts) else [*parts, np.zeros((1, *self.shape))]
 
     def _moved(self, values: Array, ahead: float, current: list[Array], speeds: list[Array]) -> Array:
         """The values a step later, by three stages (Shu and Osher 1988)."""
@@ -278,8 +303,11 @@ class Front:
         sides = [_one_sided(values, n, float(self.step[n]), mirror=n == 2) for n in range(values.ndim)]
         middle = [0.5 * (left + right) for left, right in sides]
         flux = self.waters.reach(middle)
+        if current[0].shape[0] > 1:
+            flux = flux + np.max(sum(part * slope for part, slope in zip(current, middle, strict=True)), axis=0)
         for n, (left, right) in enumerate(sides):
-            flux = flux + current[n] * middle[n] - 0.5 * speeds[n] * (right - left)
+            along = 0.0 if current[0].shape[0] > 1 else current[n][0] * middle[n]
+            flux = flux + along - 0.5 * speeds[n] * (right - left)
         return np.asarray(flux)
 
     def _left(self, values: Array) -> float:
@@ -334,8 +362,11 @@ def bound(
     dimensions: int | None = None,
     nodes: int | None = None,
     progress: Callable[[str], None] = lambda line: None,
+    any_depth: bool = False,
 ) -> Bound:
     """The least time from start to goal, by two grids, the finer with `nodes` along its longest side.
+
+    With `any_depth`, in two dimensions, the front takes the current of whichever depth is best.
 
     InputError where the front does not reach the goal: land, the sides or the current are in the way.
     """
@@ -345,7 +376,10 @@ def bound(
     require(size == 3 or not rises(problem.evaluator.flow), flat)
     finest = NODES[size] if nodes is None else nodes
     require(finest >= FEWEST, f"`nodes` must be at least {FEWEST}; got {nodes}")
-    waters = Waters(problem, size)
+    require(
+        not any_depth or size == 2, f"any depth is for 2 dimensions; got {size}, which know all depths; set 2"
+    )
+    waters = Waters(problem, size, any_depth)
     tau = CELLS * float((waters.hi - waters.lo).max()) / (finest - 1) / waters.fastest
     found = []
     for count in (1 + (finest - 1) // 2, finest):
@@ -356,4 +390,5 @@ def bound(
     require(math.isfinite(found[-1]), f"no front reaches the goal in {LATEST:g} times the straight way; {cure}")
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]
     still = problem.frozen and not is_steady(waters.flow)
-    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still)
+    sound = size == 3 or any_depth or not waters.varies(front.nodes, 0.0)
+    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still, sound)

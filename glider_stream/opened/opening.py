@@ -10,7 +10,7 @@ from ..base.settings import require
 from ..roadmap.inputs import settings_sha256
 from ..roadmap.roadmap import Roadmap
 from ..roadmap.slices import SlicedRoadmap
-from ..roadmap.store import read_any_roadmap
+from ..roadmap.store import opened_roadmap
 from ..scenario import Scenario, read_scenario, scenario_from_text, shipped_scenarios
 from ..search.path import Path
 from .questions import OpenedRoadmap, OpenedScenario
@@ -35,12 +35,13 @@ def open(
     """
     if overrides:
         before = open(roadmap)
-        return OpenedRoadmap(replace(before.roadmap, elsewhere=tuple(overrides)), before.title)
+        assert before.searches.source is not None
+        return OpenedRoadmap(replace(before.searches.source, elsewhere=tuple(overrides)), before.title)
     if isinstance(roadmap, OpenedRoadmap):
         return roadmap
     if isinstance(roadmap, Roadmap | SlicedRoadmap):
         return OpenedRoadmap(roadmap)
-    return OpenedRoadmap(read_any_roadmap(roadmap), File(roadmap).stem)
+    return OpenedRoadmap(opened_roadmap(roadmap), File(roadmap).stem)
 
 
 def open_plan(path: Path, overrides: Sequence[str] = ()) -> OpenedScenario:
@@ -59,7 +60,8 @@ def open_plan(path: Path, overrides: Sequence[str] = ()) -> OpenedScenario:
     if origin.roadmap and File(origin.roadmap).is_file():
         road = open(origin.roadmap)
         if not origin.nodes_only:
-            built = settings_sha256(road.roadmap.provenance.scenario)
+            assert road.searches.source is not None
+            built = settings_sha256(road.searches.source.provenance.scenario)
             same = built == settings_sha256(origin.scenario)
             require(same, f"the roadmap {origin.roadmap} has been built anew with other settings; {cure}")
             return open(origin.roadmap, overrides) if overrides else road
@@ -67,7 +69,7 @@ def open_plan(path: Path, overrides: Sequence[str] = ()) -> OpenedScenario:
         gone = f"the plan's roadmap {origin.roadmap} is not there: the scenario's nodes are taken instead"
         warnings.warn(f"{gone}; to use the roadmap, name it with --roadmap", InputWarning, stacklevel=2)
     scenario = scenario_from_text(origin.scenario, overrides, "the plan's scenario")
-    nodes = None if road is None else Nodes(road.position, road.roadmap.file, road.searches)
+    nodes = None if road is None else Nodes(road.position, road.searches.file, road.searches)
     return OpenedScenario(Searches(scenario, nodes=nodes))
 
 

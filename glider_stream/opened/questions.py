@@ -15,6 +15,7 @@ from ..roadmap.density import Density, density_of
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
 from ..roadmap.slices import SlicedRoadmap
+from ..roadmap.store import StoredRoadmap
 from ..scenario import Scenario
 from ..search.answer import front
 from ..search.assembly import RoutePlanner
@@ -303,10 +304,16 @@ class OpenedRoadmap(OpenedScenario):
         True
     """
 
-    def __init__(self, roadmap: Roadmap | SlicedRoadmap, title: str = "") -> None:
+    def __init__(self, roadmap: Roadmap | SlicedRoadmap | StoredRoadmap, title: str = "") -> None:
         """Keep a roadmap; `title` is the title of figures."""
         super().__init__(Searches(None, roadmap), title)
-        self.roadmap = roadmap
+
+    @property
+    def roadmap(self) -> Roadmap | SlicedRoadmap:
+        """The roadmap with all its edges; if it stayed in its file, it is read now."""
+        road = self.searches.road
+        assert road is not None
+        return road
 
     def why_no_edges(self) -> str:
         """The reason, in a sentence, if the roadmap has no edge; empty if it has some.

@@ -11,10 +11,11 @@ from ..base.arrays import Array
 from ..base.settings import require
 from ..roadmap.builder import node_positions
 from ..roadmap.problem import Problem
-from ..roadmap.roadmap import Roadmap
+from ..roadmap.roadmap import EdgeTable, Roadmap
 from ..roadmap.slices import SlicedRoadmap
+from ..roadmap.store import StoredRoadmap
 from ..scenario import Scenario, scenario_of
-from ..search.answer import Ends, planner_of
+from ..search.answer import Ends, clock_planner, planner_of
 from ..search.assembly import RoutePlanner
 from ..search.departures import Moment, seconds
 from ..search.least_time import GreatestSpeeds, least_cost
@@ -41,10 +42,16 @@ class Searches:
     """A scenario or a roadmap with problem and planners; many threads may use it at once."""
 
     def __init__(
-        self, scenario: Scenario | None, road: Roadmap | SlicedRoadmap | None = None, nodes: Nodes | None = None
+        self,
+        scenario: Scenario | None,
+        source: Roadmap | SlicedRoadmap | StoredRoadmap | None = None,
+        nodes: Nodes | None = None,
     ) -> None:
-        """Keep a `scenario`, or a roadmap with its own; `nodes` are searched instead of the scenario's."""
-        self.road = road
+        """Keep a `scenario`, or a roadmap with its own; `nodes` are searched instead of the scenario's.
+
+        Of a roadmap that stays in its file, queries with the clock running read only the edges that they need.
+        """
+        self.source = source
         self._nodes = nodes
         self._kept: dict[object, object] = {} if scenario is None else {"scenario": scenario}
         self._lock = RLock()
@@ -59,12 +66,20 @@ class Searches:
         return kept
 
     @property
+    def road(self) -> Roadmap | SlicedRoadmap | None:
+        """The roadmap with all its edges; None without one."""
+        source = self.source
+        if not isinstance(source, StoredRoadmap):
+            return source
+        return self.once("road", EdgeTable, source.whole)  # type: ignore[return-value]
+
+    @property
     def scenario(self) -> Scenario:
         """The scenario."""
 
         def read() -> Scenario:
-            assert self.road is not None
-            return scenario_of(self.road)
+            assert self.source is not None
+            return scenario_of(self.source)
 
         return self.once("scenario", Scenario, read)
 
@@ -79,18 +94,20 @@ class Searches:
         return self.once(rule, RoutePlanner, lambda: self._planner_of(self.problem, rule))  # type: ignore[type-abstract]
 
     def _planner_of(self, problem: Problem, rule: Surfacing) -> RoutePlanner:
-        road = self.road
-        return planner_of(problem, road, rule, self.position if road is None else None)
+        source = self.source
+        if isinstance(source, StoredRoadmap) and not problem.frozen and not is_steady(problem.evaluator.flow):
+            return clock_planner(problem, source, rule)
+        return planner_of(problem, self.road, rule, self.position if source is None else None)
 
     def leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
         """Return the `planner` for routes that leave at a time; None stands for the scenario's departure."""
-        problem, road = self.problem, self.road
+        problem = self.problem
         since = 0.0 if depart is None else seconds(depart, problem, "depart") - problem.departure
         changes = not is_steady(problem.evaluator.flow)
         if since == 0.0 or (changes and not problem.frozen):
             planner = self.planner(surfacing)
             return planner.leaving(since) if since else planner
-        fits = not (changes and isinstance(road, Roadmap))
+        fits = not (changes and isinstance(self.road, Roadmap))
         legs = f"frozen paths over this roadmap leave at {problem.departure:g} s"
         require(fits, f"{legs}; got {depart}; leave `query.frozen` out, or build it with that `query.departure`")
         return self._planner_of(problem.leaving(since), self.surfacing if surfacing is None else surfacing)
@@ -103,8 +120,8 @@ class Searches:
     @property
     def position(self) -> Array:
         """The nodes (n, 3) [m]."""
-        if self.road is not None:
-            return self.road.position
+        if self.source is not None:
+            return self.source.position
         if self._nodes is not None:
             return self._nodes.position
         return self.once("position", np.ndarray, lambda: node_positions(self.problem))
@@ -112,14 +129,14 @@ class Searches:
     @property
     def file(self) -> File | None:
         """The file of the roadmap whose nodes are searched; None without one."""
-        if self.road is not None:
-            return self.road.file
+        if self.source is not None:
+            return self.source.file
         return None if self._nodes is None else self._nodes.file
 
     @property
     def guide(self) -> "Searches | None":
         """The roadmap of the nodes that are searched; None without one."""
-        if self.road is not None:
+        if self.source is not None:
             return self
         return None if self._nodes is None else self._nodes.guide
 
@@ -143,7 +160,7 @@ class Searches:
         rule, road = planner.rule, self.file
         named = "" if road is None else str(road.absolute())
         what: dict[str, Any] = {"departure": planner.problem.departure, "most_yos": rule.most_yos}
-        nodes_only = self.road is None and bool(named)
+        nodes_only = self.source is None and bool(named)
         return Origin(self.scenario.text, named, nodes_only, most_hours=rule.most_hours, **what)
 
     def least(self, path: Path, departure: float) -> float:

@@ -99,8 +99,8 @@ const placeName = (x, y) => {
   return `x ${a.toFixed(digits)}, y ${b.toFixed(digits)} ${data.unit.name}`;
 };
 const spanName = (time) => `${(time / data.time.size).toFixed(data.time.size > 1 ? 2 : 0)} ${data.time.name}`;
-// a moment is a date and time where the departure is known, else hours since then
-const momentName = (time) => dateName(time) ?? `${(time / 3600).toFixed(2)} h`;
+// a moment is a date and time where the departure is known, else the time since then in the unit of the axis
+const momentName = (time) => dateName(time) ?? spanName(time);
 const dateName = (time) =>
   data.departs === null ? null : new Date(data.departs + time * 1000).toISOString().slice(0, 16).replace("T", " ") + " UTC";
 

@@ -17,8 +17,7 @@ from ..vehicle.polar import glider_sha256
 from ..water.inspect import flow_sha256
 from .inputs import inputs_of, names_of
 from .problem import Problem
-from .roadmap import Provenance, Roadmap
-from .slices import SlicedRoadmap
+from .roadmap import Made, Provenance
 
 _version = cache(version)
 """Returns the version of a package; it is cached, because it is read from files."""
@@ -52,7 +51,7 @@ def provenance_of(problem: Problem, position: Array, folder: Path | None = None)
     )
 
 
-def check_unchanged(roadmap: Roadmap | SlicedRoadmap, problem: Problem) -> None:
+def check_unchanged(roadmap: Made, problem: Problem) -> None:
     """Raise InputError unless the roadmap was built with the problem's flow, terrain and glider."""
     made = roadmap.provenance
     for name, digest, now in (

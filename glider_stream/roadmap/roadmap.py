@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,25 @@ class Provenance:
             "kernel_digest",
         )
         return {"scenario_sha256": settings_sha256(self.scenario)} | {key: getattr(self, key) for key in keys}
+
+
+class Made(Protocol):
+    """A roadmap, in memory or in its file: what made it, its file, and new places of its scenario's files."""
+
+    @property
+    def provenance(self) -> Provenance:
+        """What made it."""
+        ...
+
+    @property
+    def file(self) -> Path | None:
+        """The file from which it was read."""
+        ...
+
+    @property
+    def elsewhere(self) -> tuple[str, ...]:
+        """section.key=FILE for each file of the scenario for which the user gave a new place."""
+        ...
 
 
 @dataclass(frozen=True)

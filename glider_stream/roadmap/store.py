@@ -4,8 +4,8 @@ import contextlib
 import hashlib
 import io
 import os
-from collections.abc import Iterator
-from dataclasses import MISSING, asdict, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Array, Index
 from ..base.errors import InputError, Unwritable
 from ..base.output import replacing
 from ..base.settings import require
@@ -21,6 +22,7 @@ from ..base.untrusted import check_claim, check_file, check_links
 from ..kernels.edges import Status
 from .builder import Tally
 from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
+from .rows import EdgeRows, Span
 from .shard import Part, Shard
 from .slices import SlicedRoadmap
 
@@ -52,6 +54,7 @@ RARE = (Status.CARRIED_AWAY,)
 """The last statuses, which only flows with a vertical part know: a file names them where it counts a pair."""
 _OPTIONAL = {"nodes/lonlat", "pairs/by_node"}
 _SLICES = "slices/departure"
+_NEVER_BELOW_0 = {"time", "cost", "speed", "miss"}
 
 
 class Guarded(io.FileIO):
@@ -286,6 +289,94 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
     raise AssertionError  # never reached, because _reading raises
 
 
+@dataclass(frozen=True)
+class StoredRoadmap:
+    """A roadmap that stays in its `file`: its nodes `position` (n, 3) [m], and `rows` of edges, read when needed.
+
+    `departures` (slices,) [s] are those of its slices, None for a roadmap of one departure. `identity` is that of
+    the file when it was opened. `elsewhere`: see `Roadmap`. Damage in a part that is never read is not found.
+    """
+
+    position: Array
+    departures: Array | None
+    rows: EdgeRows
+    provenance: Provenance
+    file: Path
+    identity: tuple[int, ...]
+    elsewhere: tuple[str, ...] = ()
+
+    def whole(self) -> Roadmap | SlicedRoadmap:
+        """Read all of it; InputError if it is damaged, or if the file is another one by now."""
+        _check_same(self.file, self.identity)
+        return replace(read_any_roadmap(self.file), elsewhere=self.elsewhere)
+
+
+def opened_roadmap(path: str | Path) -> Roadmap | StoredRoadmap:
+    """Read the file of a roadmap of one departure; a roadmap of several stays in its file."""
+    with _reading(Path(path)) as file:
+        _check_head(file, Path(path), FORMAT)
+        several = int(file.attrs["format_version"]) == SLICED_VERSION
+    return stored_roadmap(path) if several else read_roadmap(path)
+
+
+def stored_roadmap(path: str | Path) -> StoredRoadmap:
+    """Return a roadmap file of which edges are read when they are needed; InputError as `read_any_roadmap`."""
+    path = Path(path)
+    with _reading(path) as file:
+        _check_head(file, path, FORMAT)
+        departures = _departures(file, path)
+        arrays = _arrays(file, path, ["nodes/position", "edges/indptr"])
+        position, indptr = arrays["nodes/position"], arrays["edges/indptr"]
+        slices = 1 if departures is None else departures.size
+        edges = _declared(file, path, "edges/target").shape
+        _check_shapes(path, position, indptr, edges, len(position) * slices)
+        for name in EDGE_FIELDS:
+            fits = _declared(file, path, f"edges/{name}").shape == edges
+            require(fits, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
+        identity = _identity(path)
+        rows = EdgeRows.on_demand(indptr, CHUNK, _StoredEdges(path, identity, len(position)))
+        return StoredRoadmap(position, departures, rows, _provenance(file), path, identity)
+    raise AssertionError  # never reached, because _reading raises
+
+
+@dataclass(frozen=True)
+class _StoredEdges:
+    """The edges of a roadmap file among so many `nodes`; `identity` is that of the file when it was opened."""
+
+    path: Path
+    identity: tuple[int, ...]
+    nodes: int
+
+    def read(self, spans: Sequence[Span], target: NDArray[np.int32], time: Array) -> None:
+        """Read targets and times of some spans; InputError if the file is another one by now."""
+        _check_same(self.path, self.identity)  # so its links are checked already
+        with _errors_of(self.path), h5py.File(self.path, "r") as file:
+            for first, last in spans:
+                target[first:last] = file["edges/target"][first:last]
+                time[first:last] = file["edges/time"][first:last]
+
+    def check(self, span: Span, indptr: Index, target: NDArray[np.int32], time: Array) -> None:
+        """Raise InputError unless the targets are nodes that rise within a row, and times are at least 0."""
+        some = slice(*span)
+        _check_values("edges/time", time[some], self.path)
+        to = target[some]
+        nodes = to.size == 0 or bool(to.min() >= 0 and to.max() < self.nodes)
+        require(nodes, f"the roadmap {self.path} is damaged: a target is no node; build it again")
+        begins = indptr[np.searchsorted(indptr, span[0]) : np.searchsorted(indptr, span[1])] - span[0]
+        _check_rises(to, begins, self.path)
+
+
+def _identity(path: Path) -> tuple[int, ...]:
+    """Return what changes if a file is replaced or written again."""
+    stat = path.stat()
+    return stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns
+
+
+def _check_same(path: Path, identity: tuple[int, ...]) -> None:
+    same = path.exists() and _identity(path) == identity
+    require(same, f"the roadmap {path} has been replaced since it was opened; open it again")
+
+
 def _names() -> list[str]:
     """Return the names of the datasets that every version may have."""
     return [name for name in _DESCRIBED if name != _SLICES]
@@ -333,13 +424,20 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
-    """Yield an open roadmap file; every error that h5py raises on a damaged file becomes an InputError."""
+    """Yield an open roadmap file after checks of its links; see `_errors_of`."""
     require(path.exists(), f"the roadmap {path} does not exist; build it first")
     check_file(path, "the roadmap")
-    try:
+    with _errors_of(path):
         check_links(path)
         with h5py.File(path, "r") as file:
             yield file
+
+
+@contextlib.contextmanager
+def _errors_of(path: Path) -> Iterator[None]:
+    """Turn every error that h5py raises on a damaged file into an InputError."""
+    try:
+        yield
     except (OSError, RuntimeError) as error:
         reason = "a checksum fails" if "filter" in str(error) else "it is no HDF5 file, or it is cut short"
         if isinstance(error, OSError) and error.errno:
@@ -378,17 +476,31 @@ def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray
         kind = _DESCRIBED[name][0]
         if name in _OPTIONAL and name not in file:
             continue
-        require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
-        dataset = file[name]
-        fits = isinstance(dataset, h5py.Dataset) and dataset.dtype.kind == np.dtype(kind).kind
-        found = getattr(dataset, "dtype", "a group")
-        require(fits, f"the roadmap {path} is damaged: {name} is {found}, not {kind}; build it again")
-        check_claim(path, name, dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
-        stored = np.asarray(dataset[()])
+        stored = np.asarray(_declared(file, path, name)[()])
         arrays[name] = stored.astype(kind, copy=False)
-        finite = bool(np.isfinite(arrays[name]).all())
-        require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
+        _check_values(name, arrays[name], path)
     return arrays
+
+
+def _declared(file: h5py.File, path: Path, name: str) -> h5py.Dataset:
+    """Return a dataset after checks of its type, and of its size against the file's size."""
+    kind = _DESCRIBED[name][0]
+    require(name in file, f"the roadmap {path} is damaged: it has no dataset {name}; build it again")
+    dataset = file[name]
+    fits = isinstance(dataset, h5py.Dataset) and dataset.dtype.kind == np.dtype(kind).kind
+    found = getattr(dataset, "dtype", "a group")
+    require(fits, f"the roadmap {path} is damaged: {name} is {found}, not {kind}; build it again")
+    check_claim(path, name, dataset.shape, dataset.dtype.itemsize, dataset.id.get_storage_size())
+    return dataset
+
+
+def _check_values(name: str, values: AnyArray, path: Path) -> None:
+    """Raise InputError if a dataset holds NaN, infinity, or values below 0 where there are none."""
+    finite = bool(np.isfinite(values).all())
+    require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
+    what = name.rpartition("/")[2]
+    sound = what not in _NEVER_BELOW_0 or bool((values >= 0).all())
+    require(sound, f"the roadmap {path} is damaged: it holds a {what} below 0; build it again")
 
 
 def _with_every_status(arrays: dict[str, AnyArray]) -> None:
@@ -403,24 +515,33 @@ def _check_edges(arrays: dict[str, AnyArray], rows: int, path: Path) -> None:
     position, indptr, target = arrays["nodes/position"], arrays["edges/indptr"], arrays["edges/target"]
     lonlat, counts = arrays.get("nodes/lonlat"), arrays.get("pairs/by_node")
     nodes, edges = len(position), target.size
+    _check_shapes(path, position, indptr, target.shape, rows)
     whole = (
-        position.shape == (nodes, 3)
-        and indptr.shape == (rows + 1,)
-        and indptr[0] == 0
-        and indptr[-1] == edges
-        and bool((np.diff(indptr) >= 0).all())
-        and all(arrays[f"edges/{name}"].shape == (edges,) for name in EDGE_FIELDS)
-        and target.shape == (edges,)
+        all(arrays[f"edges/{name}"].shape == (edges,) for name in EDGE_FIELDS)
         and (edges == 0 or bool(target.min() >= 0 and target.max() < nodes))
         and (lonlat is None or lonlat.shape == (nodes, 2))
         and (counts is None or (counts.shape == (rows, len(Status)) and bool((counts >= 0).all())))
     )
     require(whole, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
-    for name in ("time", "cost", "speed", "miss"):
-        sound = bool((arrays[f"edges/{name}"] >= 0).all())
-        require(sound, f"the roadmap {path} is damaged: it holds a {name} below 0; build it again")
+    _check_rises(target, indptr[:-1], path)
+
+
+def _check_shapes(path: Path, position: AnyArray, indptr: AnyArray, edges: tuple[int, ...], rows: int) -> None:
+    """Raise InputError unless nodes and the ends of `rows` rows fit edges of a shape."""
+    whole = (
+        position.shape == (len(position), 3)
+        and indptr.shape == (rows + 1,)
+        and indptr[0] == 0
+        and edges == (indptr[-1],)
+        and bool((np.diff(indptr) >= 0).all())
+    )
+    require(whole, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
+
+
+def _check_rises(target: AnyArray, begins: AnyArray, path: Path) -> None:
+    """Raise InputError unless targets rise, except from one row to the next; rows begin at some edges."""
     rises = target[1:] > target[:-1]
-    rises[indptr[1:-1][(indptr[1:-1] > 0) & (indptr[1:-1] < edges)] - 1] = True  # from one row to the next
+    rises[begins[(begins > 0) & (begins < target.size)] - 1] = True
     require(bool(rises.all()), f"the roadmap {path} is damaged: its targets do not rise; build it again")
 
 

@@ -13,6 +13,7 @@ from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import Roadmap
 from ..roadmap.slices import SlicedRoadmap
+from ..roadmap.store import StoredRoadmap
 from ..water.inspect import is_steady
 from .assembly import RoutePlanner
 from .layered import SurfacingPlanner
@@ -36,7 +37,10 @@ Refinement = Callable[[Path, Callable[[Path], Path] | None], Path]
 
 
 def planner_of(
-    problem: Problem, roadmap: Roadmap | SlicedRoadmap | None, rule: Surfacing, nodes: Array | None = None
+    problem: Problem,
+    roadmap: Roadmap | SlicedRoadmap | None,
+    rule: Surfacing,
+    nodes: Array | None = None,
 ) -> RoutePlanner:
     """Return the planner for a roadmap, or for `nodes` (n, 3) [m] if `roadmap` is None; its paths keep `rule`.
 
@@ -55,6 +59,14 @@ def planner_of(
         check_unchanged(roadmap, problem)
         return ClockPlanner(problem, roadmap.position, rule)
     return Planner(roadmap, problem) if rule == Surfacing() else SurfacingPlanner(roadmap, problem, rule)
+
+
+def clock_planner(problem: Problem, roadmap: StoredRoadmap, rule: Surfacing) -> ClockPlanner:
+    """Return the planner with the clock running for a roadmap that stays in its file: by slices, or by nodes."""
+    if roadmap.departures is not None:
+        return SlicePlanner(problem, SliceSearch(roadmap, problem), rule)
+    check_unchanged(roadmap, problem)
+    return ClockPlanner(problem, roadmap.position, rule)
 
 
 def _slice_of(roadmap: SlicedRoadmap, departure: float) -> Roadmap:

@@ -206,13 +206,13 @@ class LabelSearch:
         Only the places that the expansion chooses by it are examined.
         """
         wanted = np.zeros(self.height.size, np.bool_)
-        to = self.expansion.chosen
+        to = self._open_to(label)
         up = self.up[to]
         if not up.size:
             return wanted
         least = self.bound.between(label.place, to)
         time, cost = label.time + least, label.cost + self.per_leg + self.per_second * least
-        some = (self.height[to] != self.height[label.place]) & (time <= self.aim.latest)
+        some = time <= self.aim.latest
         some &= (cost + self.cost_left[to] if self.by_cost else time + self.left[to]) < self.below
         if self.priced:
             some &= cost + self.cost_left[to] < self.cost_below
@@ -222,6 +222,16 @@ class LabelSearch:
             some &= ~_any_beats(self.best[to], at_best)
         wanted[to] = some
         return wanted
+
+    def _open_to(self, label: Label) -> Index:
+        """Return the places to which a leg from a label may be useful if it took no time at all."""
+        to = np.arange(self.height.size)[self.expansion.chosen]
+        open_ = self.height[to] != self.height[label.place]
+        if not self.by_cost:
+            open_ &= label.time + self.left[to] < self.below
+        if self.best.shape[2] == 1:  # time alone counts
+            open_ &= self.best[to, :, 0].min(axis=1) > label.time
+        return np.asarray(to[open_])
 
     def _fan(self, number: int) -> Fan:
         """Return the legs of a label; the legs of the labels that follow are found together with them."""

@@ -27,8 +27,8 @@ class SlicePlanner(ClockPlanner):
         slices: SliceSearch,
         rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> None:
-        """Use the nodes of a roadmap of slices; `slices` searches that roadmap."""
-        super().__init__(problem, slices.roadmap.position, rule)
+        """Use the nodes of a roadmap of slices; `slices` searches it."""
+        super().__init__(problem, slices.position, rule)
         self.slices = slices
 
     def leaving(self, since: float) -> "SlicePlanner":
@@ -38,7 +38,7 @@ class SlicePlanner(ClockPlanner):
         return later
 
     def _query(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim) -> Path:
-        first, last = self.slices.roadmap.departures[[0, -1]]
+        first, last = self.slices.departures[[0, -1]]
         problem = self.problem
         by_slices = (
             self.rule == Surfacing()
@@ -63,7 +63,7 @@ class SlicePlanner(ClockPlanner):
 
     def _without(self, start: ArrayLike | None, goal: ArrayLike | None, aim: Aim, why: str) -> Path:
         """Return the path of `ClockPlanner`, with a note that says why the slices cannot answer."""
-        first, last = self.slices.roadmap.departures[[0, -1]]
+        first, last = self.slices.departures[[0, -1]]
         slices = f"the roadmap's slices are from {first:g} s to {last:g} s"
         note = f"{slices}, and {why}: its legs were found without them"
         path = super()._query(start, goal, aim)

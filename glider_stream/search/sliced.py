@@ -18,6 +18,7 @@ from ..roadmap.pairs import Attached, NeighbourLegs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.slices import SlicedRoadmap
+from ..roadmap.store import StoredRoadmap
 from .least_time import fastest_sink
 from .path import Hop
 
@@ -29,6 +30,8 @@ BESIDE = 0.02
 """A leg may end a little beside its target. This saves at most this share of its time."""
 LAST_LEGS_AT_ONCE = 32
 """If the goal is not a node, the last legs from this many nodes are found together."""
+AHEAD = 512
+"""When a search needs edges that are not read yet, they are read for this many nodes that come next."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +89,22 @@ class _Found:
 class SliceSearch:
     """Finds the fastest routes over a roadmap of slices, at any departure between its first and last."""
 
-    def __init__(self, roadmap: SlicedRoadmap, problem: Problem) -> None:
-        """Raise InputError if the roadmap was built with another flow, terrain or glider."""
+    def __init__(self, roadmap: SlicedRoadmap | StoredRoadmap, problem: Problem) -> None:
+        """Raise InputError if the roadmap was built with another flow, terrain or glider.
+
+        Of a roadmap that stays in its file, the edges are read that a search comes to; the routes are the same.
+        """
         check_unchanged(roadmap, problem)
-        self.roadmap, self.problem = roadmap, problem
+        assert roadmap.departures is not None
+        self.position, self.departures, self.rows = roadmap.position, roadmap.departures, roadmap.rows
+        self.problem = problem
 
     def fastest(self, start: Array, goal: Array, departure: float) -> tuple[list[Hop] | None, Agreement]:
         """Return the legs of the fastest route between two points (3,) [m], or None, and the agreement.
 
         Points that are not nodes are attached by exact legs.
         """
-        first, last = self.roadmap.departures[[0, -1]]
+        first, last = self.departures[[0, -1]]
         require(
             first <= departure <= last,
             f"the roadmap's departures are from {first:g} s to {last:g} s; got {departure:g} s",
@@ -124,10 +132,15 @@ class _Query:
     """One query: its ends, and the exact legs that are known beside the slices."""
 
     def __init__(self, search: SliceSearch, start: Array, goal: Array, departure: float, learnt: _Learnt) -> None:
-        self.roadmap, self.departure, self.learnt = search.roadmap, departure, learnt
+        self.departures, self.rows, self.departure, self.learnt = (
+            search.departures,
+            search.rows,
+            departure,
+            learnt,
+        )
         self.start, self.goal = start, goal
         self.problem = replace(search.problem, departure=departure)
-        position = self.roadmap.position
+        self.position = position = search.position
         self.starts, self.goals = (np.flatnonzero((position == end).all(axis=1)) for end in (start, goal))
         self.legs = self.problem.legs(position)
         self.ends = self.problem.evaluator.flow.extent.t_hi
@@ -144,17 +157,15 @@ class _Query:
 
     def search(self, latest: float) -> _Found | None:
         """Return the fastest way by the slices and the exact legs; None if no way arrives by `latest` [s]."""
-        road = self.roadmap
-        nodes = len(road.position)
+        nodes = len(self.position)
         arrival, before = np.full(nodes, math.inf), np.full(nodes, -1, np.int64)
         if self.away is None:
             arrival[self.starts] = self.departure
         else:
             arrival[self.away.nodes] = self.departure + self.away.outcomes[:, TIME]
         goal = int(self.goals[0]) if self.goals.size else -1
-        what = road.departures, road.indptr, road.target, road.time, *self.learnt.table(nodes)
         latest = min(latest, self.ends)
-        earliest_arrivals(*what, goal, self.least, latest, arrival, before)
+        self._arrivals(goal, latest, arrival, before)
         node, arrives, last = goal, math.inf, None
         if goal >= 0:
             arrives = float(arrival[goal])
@@ -167,9 +178,29 @@ class _Query:
             way.append(int(before[way[-1]]))
         return _Found(way[::-1], arrives, last)
 
+    def _arrivals(self, goal: int, latest: float, arrival: Array, before: Index) -> None:
+        """Run `earliest_arrivals`; edges are read when it needs them."""
+        rows, learnt = self.rows, self.learnt.table(arrival.size)
+        settled = np.zeros(arrival.size, np.bool_)
+        ends = goal, self.least, latest, arrival, before, settled
+        edges = self.departures, rows.indptr, rows.target, rows.time, rows.block
+        while earliest_arrivals(*edges, rows.known, *learnt, *ends) >= 0:
+            soonest = np.where(settled, math.inf, arrival + self.least)
+            ahead = min(AHEAD, settled.size) - 1
+            near = np.flatnonzero((soonest <= np.partition(soonest, ahead)[ahead]) & np.isfinite(soonest))
+            slices = self._slice_of(arrival[near])
+            last = slices + 1 == self.departures.size  # no row of this node follows
+            rows.need(near[last] * self.departures.size + slices[last])
+            rows.need(near[~last] * self.departures.size + slices[~last], following=2)
+
+    def _slice_of(self, when: Array | float) -> Index:
+        """Return the number of the slice at or before a time [s]; the first one before it."""
+        number = np.searchsorted(self.departures, when, side="right") - 1
+        return np.asarray(np.clip(number, 0, self.departures.size - 1))
+
     def flown(self, found: _Found) -> tuple[list[Hop] | None, float]:
         """Return the exact legs of a way and its arrival [s]; (None, inf) if a leg does not exist at its time."""
-        position, when = self.roadmap.position, self.departure
+        position, when = self.position, self.departure
         hops: list[Hop] = []
         if self.away is not None:
             row = self.away.outcomes[np.flatnonzero(self.away.nodes == found.nodes[0])[0]]
@@ -199,22 +230,19 @@ class _Query:
         if row[STATUS] != CONNECTED:
             self.learnt.lost += 1
             return
-        road = self.roadmap
-        number = int(
-            np.clip(np.searchsorted(road.departures, when, side="right") - 1, 0, road.departures.size - 1)
-        )
-        times = [self._slice_time(a, b, k) for k in (number, min(number + 1, road.departures.size - 1))]
-        ends = road.departures[[number, min(number + 1, road.departures.size - 1)]]
+        number = int(self._slice_of(when))
+        both = [number, min(number + 1, self.departures.size - 1)]
+        times, ends = [self._slice_time(a, b, k) for k in both], self.departures[both]
         known = [time for time in times if math.isfinite(time)]
         by_slices = known[0] if len(known) == 1 else float(np.interp(when, ends, times))
         self.learnt.off.append(abs(by_slices - float(row[TIME])))
 
     def _slice_time(self, a: int, b: int, number: int) -> float:
-        road = self.roadmap
-        row = a * road.departures.size + number
-        first, last = road.indptr[row], road.indptr[row + 1]
-        at = first + int(np.searchsorted(road.target[first:last], b))
-        return float(road.time[at]) if at < last and road.target[at] == b else math.inf
+        rows, row = self.rows, a * self.departures.size + number
+        rows.need(np.array([row]))
+        first, last = rows.indptr[row], rows.indptr[row + 1]
+        at = first + int(np.searchsorted(rows.target[first:last], b))
+        return float(rows.time[at]) if at < last and rows.target[at] == b else math.inf
 
     def _exact(self, start: Array, goal: Array, when: float) -> Array:
         """Return the leg between two points that leaves at a time [s], a row of `Edge`.
@@ -230,7 +258,7 @@ class _Query:
     def _last_leg(self, node: int, when: float) -> Array:
         key = node, when
         if key not in self._last:
-            self._last[key] = self._exact(self.roadmap.position[node], self.goal, when)
+            self._last[key] = self._exact(self.position[node], self.goal, when)
         return self._last[key]
 
     def _through(self, arrival: Array, latest: float) -> tuple[int, float, Array | None]:
@@ -238,7 +266,7 @@ class _Query:
 
         Nodes are tried in the order of their earliest possible arrival, until no node can be earlier.
         """
-        position = self.roadmap.position
+        position = self.position
         nodes = np.flatnonzero(np.isfinite(arrival) & (position[:, 2] != self.goal[2]))
         if isinstance(self.legs, NeighbourLegs):
             nodes = np.intersect1d(nodes, self.legs.neighbourhood.of(self.goal))
@@ -259,7 +287,7 @@ class _Query:
         new = [n for n, at in zip(nodes, when, strict=True) if (int(n), float(at)) not in self._last]
         if new:
             times = dict(zip(nodes.tolist(), when.tolist(), strict=True))
-            points = np.vstack([self.roadmap.position[new], self.goal])
+            points = np.vstack([self.position[new], self.goal])
             departs = np.array([*(times[int(n)] for n in new), 0.0])
             count = len(new)
             rows = self.problem.evaluator.connect(

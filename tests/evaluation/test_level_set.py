@@ -98,7 +98,8 @@ def test_long_routes_are_bounded_in_two_dimensions(problem):
 
 
 def test_it_says_what_it_is():
-    flat, deep = Bound(3600.0, 36.0, 2, (500.0, 400.0)), Bound(3600.0, 36.0, 3, (50.0, 40.0, 30.0))
+    flat = Bound(3600.0, 36.0, 2, (500.0, 400.0), sound=False)
+    deep = Bound(3600.0, 36.0, 3, (50.0, 40.0, 30.0))
     assert flat.as_dict()["kind"] == "estimate"
     assert deep.as_dict()["kind"] == "bound"
     assert flat.least == 3564.0
@@ -106,9 +107,19 @@ def test_it_says_what_it_is():
     assert "50 x 40 x 30 m" in str(deep)
 
 
+def test_the_current_of_any_depth_is_a_bound_where_the_mean_is_an_estimate(problem):
+    """The small scenario's own current varies with depth; an even one does not, and is bounded in either way."""
+    assert bound(problem, 2, 21).sound
+    varied = scenario_from_text(roadmap().provenance.scenario).problem()
+    mean, any_depth = bound(varied, 2, 31), bound(varied, 2, 31, any_depth=True)
+    assert (mean.sound, any_depth.sound) == (False, True)
+    assert any_depth.time < mean.time
+
+
 def test_what_cannot_be_bounded_is_refused(problem):
     for changes, asked, words in (
         ({}, {"dimensions": 4}, "`dimensions` must be 2 or 3; got 4"),
+        ({}, {"dimensions": 3, "any_depth": True}, "any depth is for 2 dimensions; got 3"),
         ({}, {"nodes": 5}, "`nodes` must be at least 21; got 5"),
         ({"start": None}, {}, "the scenario has no"),
     ):

@@ -25,6 +25,12 @@ def table(seed, nodes=30, slices=4):
     return departures, np.concatenate([[0], np.cumsum(degree)]), target, times[present]
 
 
+def arrivals(legs, learnt, *ends):
+    """Run the search with all edges known; `ends` are goal, least, latest, arrival, before."""
+    everything = max(legs[2].size, 1), np.ones(1, bool)
+    assert earliest_arrivals(*legs, *everything, *learnt, *ends, np.zeros(30, bool)) == -1
+
+
 def leg_time(departures, indptr, target, time, node, to, when):
     """The time of a leg by the rules, inf where there is none."""
     slices = departures.size
@@ -66,7 +72,7 @@ def test_arrivals_are_those_of_labels(seed, when):
     arrival, before = np.full(30, np.inf), np.full(30, -1)
     arrival[4] = when
     nothing = np.zeros(31, np.int64), NOBODY, np.empty(0), np.empty(0)
-    earliest_arrivals(*legs, *nothing, -1, NO_BOUND, math.inf, arrival, before)
+    arrivals(legs, nothing, -1, NO_BOUND, math.inf, arrival, before)
     assert arrival == pytest.approx(by_labels(legs, 4, when))
     for node in np.flatnonzero(before >= 0):
         left = arrival[before[node]]
@@ -74,8 +80,29 @@ def test_arrivals_are_those_of_labels(seed, when):
     to_one = np.full(30, np.inf)
     to_one[4] = when
     goal = int(np.flatnonzero(before == 4)[0])
-    earliest_arrivals(*legs, *nothing, goal, NO_BOUND, math.inf, to_one, before)
+    arrivals(legs, nothing, goal, NO_BOUND, math.inf, to_one, before)
     assert to_one[goal] == arrival[goal]
+
+
+def test_edges_that_become_known_on_the_way_change_nothing():
+    departures, indptr, target, time = table(7)
+    nothing = np.zeros(31, np.int64), NOBODY, np.empty(0), np.empty(0)
+    goal, found = 20, []
+    for known in (np.ones(-(-target.size // 5), bool), np.zeros(-(-target.size // 5), bool)):
+        ends = np.full(30, np.inf), np.full(30, -1), np.zeros(30, bool)
+        ends[0][4] = 60.0
+        # what is not known is not read
+        seen = np.where(np.repeat(known, 5)[: target.size], time, np.nan)
+        edges = departures, indptr, target, seen, 5, known
+        while (node := earliest_arrivals(*edges, *nothing, goal, NO_BOUND, math.inf, *ends)) >= 0:
+            edge = int(indptr[node * 4 + np.searchsorted(departures, ends[0][node], side="right") - 1])
+            block = next(n for n in range(edge // 5, known.size) if not known[n])
+            known[block] = True
+            seen[block * 5 : block * 5 + 5] = time[block * 5 : block * 5 + 5]
+        found.append((*ends, known))
+    for whole, later in zip(found[0][:3], found[1][:3], strict=True):
+        assert whole.tobytes() == later.tobytes()
+    assert 0.1 < found[1][3].mean() < 0.9
 
 
 def test_a_bound_and_a_deadline_change_no_arrival():
@@ -83,14 +110,14 @@ def test_a_bound_and_a_deadline_change_no_arrival():
     nothing = np.zeros(31, np.int64), NOBODY, np.empty(0), np.empty(0)
     free = np.full(30, np.inf)
     free[4] = 0.0
-    earliest_arrivals(*legs, *nothing, -1, NO_BOUND, math.inf, free, np.full(30, -1))
+    arrivals(legs, nothing, -1, NO_BOUND, math.inf, free, np.full(30, -1))
     goal = int(np.argsort(free)[15])
     # every leg takes 10 s at the least
     least = np.where(np.arange(30) == goal, 0.0, 9.9)
     for latest, arrives in ((math.inf, free[goal]), (free[goal], free[goal]), (free[goal] - 0.1, math.inf)):
         bound, before = np.full(30, np.inf), np.full(30, -1)
         bound[4] = 0.0
-        earliest_arrivals(*legs, *nothing, goal, least, latest, bound, before)
+        arrivals(legs, nothing, goal, least, latest, bound, before)
         assert bound[goal] == arrives
         assert (bound[np.isfinite(bound)] >= free[np.isfinite(bound)]).all()
 
@@ -102,7 +129,7 @@ def test_what_was_learnt_goes_before_the_slices():
     to = int(target[indptr[1]])
     learnt = np.ones(31, np.int64), np.array([to]), departures[[1]].copy(), np.array([1.5])
     learnt[0][0] = 0
-    earliest_arrivals(departures, indptr, target, time, *learnt, -1, NO_BOUND, math.inf, arrival, before)
+    arrivals((departures, indptr, target, time), learnt, -1, NO_BOUND, math.inf, arrival, before)
     assert arrival[to] == departures[1] + 1.5
     assert before[to] == 0
 

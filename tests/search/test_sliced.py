@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 from helpers.slices import arrival_by_labels, problem, sliced
@@ -13,7 +14,9 @@ from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
 from glider_stream.kernels.edges import CONNECTED
 from glider_stream.kernels.flow import velocity
+from glider_stream.roadmap import store
 from glider_stream.roadmap.compare import difference
+from glider_stream.search import sliced as sliced_module
 from glider_stream.search.answer import planner_of
 from glider_stream.search.slice_planner import SlicePlanner
 from glider_stream.search.sliced import SliceSearch
@@ -83,6 +86,35 @@ def test_a_leg_from_end_to_end_is_looked_at(search):
         assert direct.status != CONNECTED or arrival(hops, 0.0) <= direct.time
         alone += len(hops) == 1
     assert alone > 0
+
+
+def test_a_roadmap_that_stays_in_its_file_gives_the_same_routes(search, tmp_path, monkeypatch):
+    """Bit by bit, though it reads only some edges; a file that was written since, or is damaged, is refused."""
+    monkeypatch.setattr(store, "CHUNK", 256)
+    monkeypatch.setattr(sliced_module, "AHEAD", 1)
+    file, position = tmp_path / "slices.h5", sliced().position
+    store.write_roadmap(sliced(), file)
+    beside = np.array([420.0, 380.0, 0.0]), np.array([1510.0, 640.0, -300.0])
+    near = position[-2], position[sliced().target[sliced().indptr[(len(position) - 2) * 4]]]
+    for ends, departure in ((near, 0.0), ((position[-2], position[-1]), 370.0), (beside, 1300.0)):
+        kept = store.stored_roadmap(file)
+        assert str(SliceSearch(kept, problem()).fastest(*ends, departure)) == str(
+            search.fastest(*ends, departure)
+        )
+        assert ends is not near or kept.rows.known.mean() < 0.9
+    opened = glider_stream.open(file)
+    assert opened.query().as_dict()["legs"] == glider_stream.open(sliced()).query().as_dict()["legs"]
+    assert opened.searches.source.rows.known.any()
+    assert difference(opened.roadmap.at(1), sliced().at(1)).same_edges
+    kept, late = store.stored_roadmap(file), store.stored_roadmap(file)
+    with h5py.File(file, "r+") as damaged:
+        damaged["edges/target"][:] = 0
+    with pytest.raises(InputError, match="has been replaced since it was opened; open it again"):
+        SliceSearch(late, problem()).fastest(*beside, 0.0)
+    with pytest.raises(InputError, match="has been replaced since it was opened; open it again"):
+        kept.whole()
+    with pytest.raises(InputError, match="its targets do not rise; build it again"):
+        SliceSearch(store.stored_roadmap(file), problem()).fastest(*beside, 0.0)
 
 
 def test_threads_do_not_change_a_bit(search):

@@ -136,7 +136,7 @@ def test_when_to_leave_asks_the_slices(file, capsys):
 
 def test_a_figure_of_it_shows_one_slice_over_the_current_of_its_time(road, monkeypatch):
     drawn = []
-    monkeypatch.setattr("glider_stream.plot.draw.draw_roadmap", lambda *what: drawn.append(what))
+    monkeypatch.setattr("glider_stream.opened.drawing.draw_roadmap", lambda *what: drawn.append(what))
     road.searches._kept["problem"] = replace(problem(), departure=700.0)
     road.plot()
     slice_drawn, at, *_, title = drawn[0]
