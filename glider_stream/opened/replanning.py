@@ -19,7 +19,7 @@ from ..roadmap.slices import SlicedRoadmap
 from ..scenario import with_currents
 from ..search.assembly import RoutePlanner
 from ..search.departures import Moment, seconds
-from ..search.flown_on import check_currents, check_plan, flown_on
+from ..search.flown_on import check_currents, check_plan, check_smooth, flown_on
 from ..search.path import SURFACE, Path, load_path, placed
 from ..search.query import Planner
 from ..search.surfacing import Surfacing
@@ -151,6 +151,8 @@ def at_fix(searches: Searches, old: Path, time: Moment, renewed: bool) -> tuple[
     if not renewed:
         check_moment(leaving, "the plan's departure", "give the currents that it was planned with")
         check_currents(old, leaving)
+    elif leaving.to_lonlat is not None:
+        check_smooth(old)
     since = seconds(time, problem, "fix") - began
     if since < 0:
         left = f"{began:,.0f} s" if leaving.departs is None else moment(leaving.departs, 0.0)
