@@ -43,6 +43,7 @@ class Leg:
     `end`, at the distance `miss` [m]. In a geographic scenario `lonlat` (2, 2) [degrees] are start and end,
     `track` (m, 2) [degrees] is the trajectory, and `north` [rad] is the direction of true north,
     counter-clockwise from the frame's +y. `cost` is the cost of this leg.
+    `lifted` [m] is how far the water lifts the glider on the way, below 0 if it sinks.
 
     Examples:
         >>> leg = road.query().legs[0]
@@ -65,6 +66,7 @@ class Leg:
     track: Array | None = None
     north: float = 0.0
     cost: float = 0.0
+    lifted: float = 0.0
 
     @property
     def compass(self) -> float:
@@ -82,6 +84,7 @@ class Leg:
             "depart_s": self.depart,
             "duration_s": self.duration,
             "miss_m": self.miss,
+            **({"lifted_m": self.lifted} if self.lifted else {}),
             "trajectory": self.trajectory.tolist(),
         }
 
@@ -95,6 +98,7 @@ class Leg:
             f"{moment(departs, self.depart):>9}  {way} {begin:7.0f} m to {end:6.0f} m{place}  "
             f"glide {glide:6.1f} deg  compass {self.compass:5.1f} deg  "
             f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
+            + (f"  lifted {self.lifted:.1f} m" if self.lifted else "")
         )
 
 
@@ -384,7 +388,8 @@ def _read_leg(leg: Any, where: str) -> Leg:
     require(min(speed, depart, duration, miss) >= 0, f"{where} has a speed, time or miss below 0")
     start, end = (_numbers(leg, name, where, 3) for name in ("from", "to"))
     rows = _numbers(leg, "trajectory", where, None, 4)
-    return Leg(start, end, angle, heading, speed, depart, duration, miss, rows)
+    lifted = float(_numbers({"lifted_m": 0.0, **leg}, "lifted_m", where))
+    return Leg(start, end, angle, heading, speed, depart, duration, miss, rows, lifted=lifted)
 
 
 def _check_legs(legs: tuple[Leg, ...]) -> None:
@@ -395,7 +400,7 @@ def _check_legs(legs: tuple[Leg, ...]) -> None:
     """
     here, clock = legs[0].start, legs[0].depart
     for n, leg in enumerate(legs, 1):
-        rows, rises = leg.trajectory, leg.speed * math.sin(leg.glide_angle) * leg.duration
+        rows, rises = leg.trajectory, leg.speed * math.sin(leg.glide_angle) * leg.duration + leg.lifted
         most = BESIDE * max(1.0, math.dist(leg.start, leg.end))
         late = [leg.depart - clock, rows[0, 0] - leg.depart, rows[-1, 0] - leg.depart - leg.duration]
         odd = {
