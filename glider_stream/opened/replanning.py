@@ -6,8 +6,9 @@ from pathlib import Path as File
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Bools
 from ..base.clock import moment
 from ..base.settings import require
 from ..pilot.replan import Replan, compared, good_until_of, shown
@@ -18,7 +19,7 @@ from ..roadmap.slices import SlicedRoadmap
 from ..scenario import with_currents
 from ..search.assembly import RoutePlanner
 from ..search.departures import Moment, seconds
-from ..search.flown_on import check_currents, check_plan, flown_on
+from ..search.flown_on import check_currents, check_plan, check_smooth, flown_on
 from ..search.path import SURFACE, Path, load_path, placed
 from ..search.query import Planner
 from ..search.surfacing import Surfacing
@@ -29,9 +30,10 @@ from .searches import Nodes, Searches
 
 LATEST_FIX = 366 * 86_400.0
 """A fix is at most so long [s] after its plan's departure; seconds since 1970, say, are not the flow's."""
-NEAR = 0.1
+NEAR = 0.03, 0.1
 """A replan with the clock running searches the nodes on ways at most this share longer than the best way, by the
-legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands."""
+legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands. The
+second share is for when the first finds no route, or one that passes nodes of more than half the share."""
 
 
 class Fix(NamedTuple):
@@ -91,37 +93,44 @@ def _anew(
     searches: Searches, planner: RoutePlanner, ends: tuple[Array, Array], all_nodes: bool, options: dict[str, Any]
 ) -> tuple[Path, RoutePlanner, tuple[str, ...]]:
     """Return a new route, its planner and notes: among the nodes near the best ways, else among all."""
-    near, share = (planner, 1.0) if all_nodes else _near_ways(searches, planner, *ends)
-    if share < 1:
-        new = routed(searches, near, ends, **options)
-        if new.found:
-            nodes = f"{share:.0%} of the nodes, those on ways of the roadmap's legs at most {NEAR:.0%}"
+    every = all_nodes or type(planner) is not ClockPlanner
+    longer = np.zeros(len(searches.position)) if every else _longer(searches, *ends)
+    for share in NEAR:
+        near: Bools = longer <= share
+        if near.all():
+            break
+        nodes = np.ascontiguousarray(searches.position[near])
+        among = ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen)
+        new = routed(searches, among, ends, **options)
+        if new.found and (share == NEAR[-1] or _stays_within(new, searches.position, longer, share / 2)):
+            said = f"{near.mean():.0%} of the nodes, those on ways of the roadmap's legs at most {share:.0%}"
             cure = "--all-nodes searches all, which takes longer"
-            return new, near, (*new.notes, f"searched among {nodes} longer than their best; {cure}")
+            return new, among, (*new.notes, f"searched among {said} longer than their best; {cure}")
     new = routed(searches, planner, ends, **options)
     return new, planner, new.notes
 
 
-def _near_ways(
-    searches: Searches, planner: RoutePlanner, start: Array, goal: Array
-) -> tuple[RoutePlanner, float]:
-    """Return the planner among the nodes near the best ways by the legs of a roadmap, and their share.
+def _stays_within(path: Path, position: Array, longer: Array, share: float) -> bool:
+    """Return whether the nodes (n, 3) [m] at a path's stops lie on ways at most a share `longer` (n,) than the
+    best."""
+    stops = np.array([leg.end for leg in path.legs[:-1]]).reshape(-1, 3)
+    return bool((longer[KDTree(position).query(stops)[1]] <= share).all())
 
-    It is the same planner, and 1, if its legs are known, or if no roadmap has legs of one departure.
+
+def _longer(searches: Searches, start: Array, goal: Array) -> Array:
+    """Return by which share (n,) the ways through each node are longer than the best, by the legs of a roadmap.
+
+    Zeros if no roadmap has legs of one departure, or if they lead to no way.
     """
     guide = searches.guide
-    if type(planner) is not ClockPlanner or guide is None:
-        return planner, 1.0
+    if guide is None:
+        return np.zeros(len(searches.position))
     road, legs_of = guide.road, guide.problem
     assert road is not None
     by_legs = guide.once("guide", Planner, lambda: Planner(_one_slice(road), legs_of))
     through = by_legs.arrivals(start) + by_legs.remaining(goal)
     best = float(through.min(initial=np.inf))
-    if not np.isfinite(best):
-        return planner, 1.0
-    near = through <= (1 + NEAR) * best
-    nodes = np.ascontiguousarray(planner.position[near])
-    return ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen), float(near.mean())
+    return through / best - 1 if 0 < best < np.inf else np.zeros(through.size)
 
 
 def at_fix(searches: Searches, old: Path, time: Moment, renewed: bool) -> tuple[Problem, float]:
@@ -142,6 +151,8 @@ def at_fix(searches: Searches, old: Path, time: Moment, renewed: bool) -> tuple[
     if not renewed:
         check_moment(leaving, "the plan's departure", "give the currents that it was planned with")
         check_currents(old, leaving)
+    elif leaving.to_lonlat is not None:
+        check_smooth(old)
     since = seconds(time, problem, "fix") - began
     if since < 0:
         left = f"{began:,.0f} s" if leaving.departs is None else moment(leaving.departs, 0.0)

@@ -260,6 +260,12 @@ def compared(
         begin >= 0,
         "no dive of the plan ends by the fix, so `--dac` has nothing to be compared with; leave it out",
     )
+    ends = old.legs[begin].start[2], old.legs[first - 1].end[2]
+    require(
+        min(ends) >= -SURFACE,
+        f"the dive of the plan that ends by the fix is from {0.0 - ends[0]:.0f} m to {0.0 - ends[1]:.0f} m, "
+        "not from the surface to the surface, so `--dac` would be compared with a part of it; leave it out",
+    )
     rows = np.concatenate([leg.trajectory for leg in old.legs[begin:first]])
     places = rows[:, 1:3] + (fix[:2] - rows[-1, 1:3])
     past = rows[:, 0] - rows[-1, 0]

@@ -23,6 +23,8 @@ LOOKS: dict[str, tuple[str, Any]] = {
     "straight": ("#cc79a7", (0, (2, 1))),
 }
 """Colour and line of each policy (Okabe, Ito 2008): they differ in print and for people who see few colours."""
+FEW = 5
+"""With fewer runs each is a mark, since shares and boxes of a few runs say nothing."""
 MOST_TRACKS = 60
 """So many tracks of each policy are drawn; more would hide the current."""
 
@@ -100,25 +102,29 @@ def _draw_tracks(ax: Any, frame: Frame, runs: Runs) -> None:
     shown = max(len(flown) for flown in runs.values())
     alpha = float(np.clip(6.0 / shown, 0.12, 0.9))
     for policy, flown in runs.items():
-        colour, _ = LOOKS[policy]
+        colour, style = LOOKS[policy]
+        look: dict[str, Any] = {"color": colour, "linestyle": style}
         for run in flown[:MOST_TRACKS]:
             line = frame.scaled(run.track[:, 1:])
-            ax.plot(*line[:, :2].T, color=colour, linewidth=0.9, alpha=alpha, zorder=5)
-        ax.plot([], [], color=colour, linewidth=2.0, label=policy)
+            ax.plot(*line[:, :2].T, linewidth=1.2, alpha=alpha, zorder=5, **look)
+        ax.plot([], [], linewidth=2.0, label=policy, **look)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=5, frameon=False, fontsize=8)
 
 
 def _draw_plan(ax: Any, frame: Frame, runs: Runs) -> None:
     """Draw the first plan of run 0, and what was flown, of replanning or else of the first policy."""
     policy = "replan" if "replan" in runs else next(iter(runs))
-    run, colour = runs[policy][0], LOOKS[policy][0]
+    run, (colour, style) = runs[policy][0], LOOKS[policy]
     flown = frame.scaled(run.track[:, 1:])
     plan = frame.scaled(np.column_stack([run.line, np.zeros(len(run.line))]))
-    for line, look in ((flown, {"color": colour}), (plan, {"color": INK, "linestyle": (0, (4, 2))})):
+    for line, look in (
+        (flown, {"color": colour, "linestyle": style}),
+        (plan, {"color": INK, "linestyle": (0, (4, 2))}),
+    ):
         ax.plot(*line[:, :2].T, color="white", linewidth=3.6, zorder=5)
         ax.plot(*line[:, :2].T, linewidth=1.8, zorder=6, **look)
     ax.plot([], [], color=INK, linestyle=(0, (4, 2)), label="first plan")
-    ax.plot([], [], color=colour, label="flown")
+    ax.plot([], [], color=colour, linestyle=style, label="flown")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, frameon=False, fontsize=8)
     ax.set_title(f"(b) Plan and flown: run 0, {policy}")
 
@@ -127,6 +133,14 @@ def _draw_arrivals(ax: Any, runs: Runs) -> None:
     """Draw the share of all runs that have arrived by each time."""
     latest = max((run.time for flown in runs.values() for run in flown if run.arrived), default=1.0)
     unit, name = time_unit(latest)
+    if max(len(flown) for flown in runs.values()) < FEW:
+        _draw_single(
+            ax, {policy: [run.time / unit for run in flown if run.arrived] for policy, flown in runs.items()}
+        )
+        counts = [f"{sum(run.arrived for run in flown)} of {len(flown)}" for flown in runs.values()]
+        ax.set_yticks(range(1, len(runs) + 1), [f"{name} ({n})" for name, n in zip(runs, counts, strict=True)])
+        ax.set(xlabel=f"Time since departure ({name})", title="(c) Who has arrived, and when: a mark a run")
+        return
     for policy, flown in runs.items():
         colour, line = LOOKS[policy]
         times = np.sort([run.time for run in flown if run.arrived]) / unit
@@ -156,15 +170,32 @@ def _draw_ratios(ax: Any, runs: Runs) -> None:
         ]
         for name in names
     ]
+    if len(best) < FEW:
+        _draw_single(ax, dict(zip(names, ratios, strict=True)))
+    else:
+        _draw_boxes(ax, names, ratios)
+    ax.axvline(1.0, color=GREY, linewidth=0.8)
+    ax.set_yticks(
+        range(1, len(names) + 1), [f"{name} ({len(some)})" for name, some in zip(names, ratios, strict=True)]
+    )
+    ax.set(xlabel="Time over the omniscient's (runs in which both arrive)")
+    what = "a mark a run" if len(best) < FEW else "half of the runs in a box"
+    ax.set_title(f"(d) How much longer it takes; {what}")
+
+
+def _draw_single(ax: Any, values: Mapping[str, Sequence[float]]) -> None:
+    """Draw a mark for each value of each policy, a policy a row."""
+    for row, (policy, some) in enumerate(values.items(), 1):
+        look: dict[str, Any] = {"s": 60, "color": LOOKS[policy][0], "edgecolors": INK, "linewidths": 0.8}
+        ax.scatter(some, np.full(len(some), row), zorder=4, **look)
+    ax.set_ylim(0.4, len(values) + 0.6)
+    ax.grid(color="#e6e6e6", linewidth=0.6)
+
+
+def _draw_boxes(ax: Any, names: Sequence[str], ratios: Sequence[Sequence[float]]) -> None:
     look = {"color": INK, "linewidth": 1.2}
     boxes = ax.boxplot(ratios, orientation="horizontal", widths=0.6, medianprops=look, patch_artist=True)
     for box, name in zip(boxes["boxes"], names, strict=True):
         box.set(facecolor=LOOKS[name][0], alpha=0.55)
     for flier in boxes["fliers"]:
         flier.set(marker=".", markersize=3, markeredgecolor=GREY)
-    ax.axvline(1.0, color=GREY, linewidth=0.8)
-    ax.set_yticks(
-        range(1, len(names) + 1), [f"{name} ({len(some)})" for name, some in zip(names, ratios, strict=True)]
-    )
-    ax.set(xlabel="Time over the omniscient's (runs in which both arrive)")
-    ax.set_title("(d) How much longer it takes; half of the runs in a box")

@@ -8,7 +8,7 @@ import contextlib
 import importlib
 import warnings
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +102,32 @@ def time_text(seconds: float) -> str:
     """Return a span of time [s] as text."""
     unit, name = time_unit(seconds)
     return f"{seconds / unit:.3g} {name}"
+
+
+def departs_text(departs: datetime | None, seconds: float) -> str:
+    """Return the dates of a departure and of the arrival so much later, as text; empty if unknown."""
+    if departs is None:
+        return ""
+    arrives = departs + timedelta(seconds=seconds)
+    return f", departs {departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
+
+
+HOURS = (1, 2, 3, 6, 12, 24, 48, 96, 168, 336)
+"""The allowed distances of two dates on an axis [h]."""
+MOST_DATES = 6
+
+
+def draw_dates(ax: Any, departs: datetime | None, seconds: float, unit: float) -> None:
+    """Draw round dates above a panel whose axis is the time since `departs`, in `unit` [s], to `seconds`."""
+    if departs is None:
+        return
+    step = next((3600 * n for n in HOURS if seconds / (3600 * n) <= MOST_DATES), 3600 * HOURS[-1])
+    begins = departs.replace(tzinfo=UTC).timestamp()
+    at = np.arange(np.ceil(begins / step), np.floor((begins + seconds) / step) + 1) * step - begins
+    above = ax.secondary_xaxis("top")
+    form = "%d %b" if step >= 86_400 else "%d %b %H:%M"
+    above.set_xticks(at / unit, [f"{departs + timedelta(seconds=float(after)):{form}}" for after in at])
+    above.tick_params(labelsize=8, length=3)
 
 
 def when_text(steady: bool, seconds: float, departs: datetime | None) -> str:

@@ -1,7 +1,6 @@
 """A chart of a route for its pilot: coast, fronts, and depth, heading and speeds against time."""
 
 from collections.abc import Sequence
-from datetime import timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,8 @@ from .canvas import (
     PASSING,
     STILL,
     colours,
+    departs_text,
+    draw_dates,
     frozen,
     new_figure,
     styled,
@@ -26,7 +27,7 @@ from .canvas import (
     when_text,
 )
 from .fronts import Fronts, draw_fronts
-from .scene import SEABED, draw_current, draw_ends
+from .scene import SEABED, draw_current, draw_ends, draw_scale, draw_waypoints
 from .seabed import sample_bottom
 from .water import Frame, checked_depths, frame_of, passing
 
@@ -77,16 +78,15 @@ def plot_chart(
         unit, name = time_unit(float(rows[-1, 0]))
         clock = _Clock(unit, name, Normalize(0.0, float(rows[-1, 0]) / unit))
         text = f"{len(path.legs)} leg{'s' * (len(path.legs) > 1)}, {time_text(path.travel_time)}"
-        if path.departs is not None:
-            arrives = path.departs + timedelta(seconds=path.travel_time)
-            text += f", departs {path.departs:%Y-%m-%d %H:%M} UTC, arrives {arrives:%Y-%m-%d %H:%M} UTC"
+        text += departs_text(path.departs, path.travel_time)
         still = path.frozen or (fronts is not None and fronts[0].frozen)
         text += f"; {STILL}" if still else ""
         figure = new_figure(14.0, 8.6, f"{title}: {text}" if title else f"Route: {text}")
         halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.05), wspace=0.02)
         left, right = halves
         ax, at = left.add_subplot(), passing(path, problem.departure)
-        image = draw_current(ax, flow, terrain, frame, depth, at, pale=0.55, arrows=22)
+        image = draw_current(ax, flow, terrain, frame, depth, at, pale=0.55, arrows=22, key=True)
+        draw_scale(ax, frame)
         left.colorbar(image, ax=ax, label="Current speed (m/s)", location="bottom", aspect=45, pad=0.01)
         if fronts is not None:
             draw_fronts(ax, frame, *fronts)
@@ -96,10 +96,12 @@ def plot_chart(
         ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
         line = _draw_route(ax, frame, rows, stops, clock)
+        draw_waypoints(ax, frame, stops)
         look = {"location": "bottom", "aspect": 45, "pad": 0.01}
         left.colorbar(line, ax=ax, label=f"Time since departure ({name})", **look)
         panels = right.subplots(3, 1, sharex=True, height_ratios=(1.25, 1.0, 1.0))
         _draw_depth(panels[0], terrain, rows, clock)
+        draw_dates(panels[0], path.departs, float(rows[-1, 0]), clock.unit)
         steps = along(path)
         _draw_heading(panels[1], steps, clock)
         _draw_speeds(panels[2], steps, clock)

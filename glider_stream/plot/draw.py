@@ -80,10 +80,10 @@ def draw_route(
     """
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     check_water(problem, route, "the path")
+    route = placed(route, problem)
     if not chart and fronts is None and not is_page(output):
         figure = plot_route(flow, terrain, problem, position, route, depths, title)
     else:
-        route = placed(route, problem)
         every: tuple[Fronts, float] | None = None
         if fronts is not None:
             reached, changes = fronts_of(position, arrivals(route.start), terrain), not is_steady(flow)

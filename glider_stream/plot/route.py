@@ -17,6 +17,8 @@ from .canvas import (
     PASSING,
     STILL,
     colours,
+    departs_text,
+    draw_dates,
     frozen,
     new_figure,
     styled,
@@ -24,7 +26,7 @@ from .canvas import (
     time_unit,
     when_text,
 )
-from .scene import draw_current, draw_ends, draw_space, stretch
+from .scene import draw_current, draw_ends, draw_scale, draw_space, draw_waypoints, stretch
 from .water import Frame, checked_depths, frame_of, passing, sample_field
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
     from ..search.path import Path
 
 MAX_MAPS, MAX_NUMBERS, ARROWS = 4, 40, 44
-MAPS_ROOM = 4.9, 5.6  # inches across and up
+MAPS_ROOM = 6.2, 5.6  # inches across and up
 LONGEST_ARROW = 0.4  # inches, in the profile
 
 
@@ -88,12 +90,13 @@ def plot_route(
         dated = when if problem.departs is not None else ""
         if path.clock_runs:
             when = dated = PASSING
+        text += departs_text(path.departs, path.travel_time)
         text += f"; currents {'' if path.clock_runs else 'of '}{dated.removeprefix(', ')}" if dated else ""
         text += f"; {STILL}" if path.frozen else ""
         figure = new_figure(13.0, 9.8, f"{title}: {text}" if title else f"Route: {text}")
         levels, at = map_depths(position, frame, depths), passing(path, problem.departure)
         columns, filled = map_columns(levels.size, frame)
-        right = 0.4 + 0.75 * filled
+        right = 0.4 + 0.95 * filled
         grid = figure.add_gridspec(2, 3, height_ratios=(2.4, 1.0), width_ratios=(2.15 - right, 0.03, right))
         space = figure.add_subplot(grid[0, 0], projection="3d")
         draw_space(space, terrain, frame, position, label="node")
@@ -102,12 +105,16 @@ def plot_route(
         maps = [figure.add_subplot(cells[n // columns, n % columns]) for n in range(levels.size)]
         for n, (ax, depth) in enumerate(zip(maps, levels, strict=True)):
             draw_current(ax, flow, terrain, frame, depth, at)
+            draw_scale(ax, frame)
             ax.set_title(f"{'(b) ' if n == 0 else ''}Current at {depth:.4g} m{'' if dated else when}")
             below, left = n + columns >= levels.size, n % columns == 0
             ax.set(xlabel=frame.labels[0] * below, ylabel=frame.labels[1] * left)
             ax.tick_params(labelbottom=below, labelleft=left)
             _draw_track(ax, frame, rows, stops, depth, norm)
-        _share_colours(figure, maps)
+            if n == 0:
+                draw_waypoints(ax, frame, stops)
+        side = filled * MAPS_ROOM[0] / columns * (frame.y[1] - frame.y[0]) / (frame.x[1] - frame.x[0])
+        _share_colours(figure, maps, min(1.0, -(-levels.size // columns) * side / MAPS_ROOM[1]))
         _draw_profile(figure.add_subplot(grid[1, :]), flow, path, rows, problem.departure, norm)
         return frozen(figure)
 
@@ -137,7 +144,7 @@ def _draw_flight(ax: Any, frame: Frame, rows: Array, stops: Array, norm: Any) ->
     draw_ends(ax, ends)
     ax.plot([], [], color=INK, linewidth=3.2, label="near the depth of a map")
     ax.set_title(f"(a) The route in space, {stretch(frame)}", loc="left")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, frameon=False, fontsize=8)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3, frameon=False, fontsize=8)
 
 
 def _draw_track(ax: "Axes", frame: Frame, rows: Array, stops: Array, depth: float, norm: Any) -> None:
@@ -152,12 +159,13 @@ def _draw_track(ax: "Axes", frame: Frame, rows: Array, stops: Array, depth: floa
     draw_ends(ax, frame.scaled(stops)[:, :2], 0.7)
 
 
-def _share_colours(figure: "Figure", maps: list[Any]) -> None:
+def _share_colours(figure: "Figure", maps: list[Any], tall: float) -> None:
+    """Give all maps the same colours, and draw their bar over the share `tall` of the height."""
     images = [ax.images[-1] for ax in maps]
     fastest = max(float(np.ma.filled(image.get_array(), 0.0).max()) for image in images)
     for image in images:
         image.set_clim(0.0, fastest or 1.0)
-    figure.colorbar(images[0], ax=maps, label="Current speed (m/s)", aspect=35, pad=0.02)
+    figure.colorbar(images[0], ax=maps, label="Current speed (m/s)", aspect=35 * tall, pad=0.02, shrink=tall)
 
 
 def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: float, norm: Any) -> None:
@@ -197,6 +205,7 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
         title += "; dotted: the vertical current, upward"
         _draw_rise(ax, at / unit, currents(flow, x, y, z, when)[:, 2])
     ax.set_title(title)
+    draw_dates(ax, path.departs, float(rows[-1, 0]), unit)
     bar = ax.figure.colorbar(line, ax=ax, label="Depth of the route (m)", aspect=12, pad=0.01)
     bar.ax.invert_yaxis()
 

@@ -7,6 +7,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..search.path import SURFACE
 from .canvas import GREY, INK, colours, thinned
 from .graticule import draw_graticule
 from .seabed import ground_of
@@ -20,6 +21,8 @@ MAX_NODES = 4000
 HEIGHT = 0.55  # of a box in space, to its longer side
 LAND, SEABED = "#8c8c8c", "#cfcfcf"
 COASTLINE = 1.2  # points
+MOST_WAYPOINTS = 14
+"""So many numbers of waypoints are drawn on a map; more would hide the route."""
 
 
 def draw_land(ax: "Axes", terrain: Terrain, frame: Frame, depth: float) -> bool:
@@ -56,11 +59,12 @@ def draw_current(
     t: Time,
     pale: float = 0.15,
     arrows: int = 15,
+    key: bool = False,
 ) -> Any:
     """Draw the current at a depth [m] and a time t [s] (one, or one for each place); return the image.
 
     Colours are speeds, arrows are directions. `pale` is the share of white in the colours, `arrows` the number of
-    arrows along the longer side.
+    arrows along the longer side. With `key` an arrow with its speed stands in the lower right corner.
     """
 
     def current(count: int) -> tuple[Array, Array, Array, Array]:
@@ -85,11 +89,59 @@ def draw_current(
         "width": 0.07 / arrows,
         "pivot": "mid",
     }
-    ax.quiver(x, y, u * length, v * length, angles="xy", color=INK, alpha=0.55, **look)
+    drawn = ax.quiver(x, y, u * length, v * length, angles="xy", color=INK, alpha=0.55, **look)
+    if key and (fastest := float(np.nanmax(speed, initial=0.0))) > 0:
+        shown = round_below(0.7 * fastest)
+        put = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}, "zorder": 8}
+        named = ax.quiverkey(drawn, 0.93, 0.035, float(np.sqrt(shown / fastest)), f"{shown:g} m/s", **put)
+        named.text.set_path_effects(halo())
     ax.set(xlim=ends[:2], ylim=ends[2:], aspect="equal")
     ax.locator_params(nbins=5, steps=[1, 2, 5, 10])
     draw_graticule(ax, frame)
     return image
+
+
+def halo() -> list[Any]:
+    """Return the white edge by which text can be read over a map."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=2.5, foreground="white")]
+
+
+def round_below(value: float) -> float:
+    """Return the greatest of 1, 2 and 5 times a power of ten that is not above a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(k * power for k in (1.0, 2.0, 5.0) if k * power <= value * (1 + 1e-9)))
+
+
+def draw_scale(ax: "Axes", frame: Frame) -> None:
+    """Draw a bar of a round length in the lower left corner of a map."""
+    wide = frame.x[1] - frame.x[0]
+    bar = round_below(0.25 * wide)
+    text = f"{bar / 1000:g} km" if bar >= 1000 else f"{bar:g} m"
+    begin = 0.04
+    look: dict[str, Any] = {"transform": ax.transAxes, "solid_capstyle": "butt"}
+    ends = [begin, begin + bar / wide]
+    ax.plot(ends, [0.035, 0.035], color="white", linewidth=5.0, zorder=8, **look)
+    ax.plot(ends, [0.035, 0.035], color=INK, linewidth=2.2, zorder=8.1, **look)
+    place: dict[str, Any] = {"transform": ax.transAxes, "ha": "center", "va": "bottom", "fontsize": 8}
+    ax.text(begin + 0.5 * bar / wide, 0.05, text, zorder=8.1, path_effects=halo(), **place)
+
+
+def draw_waypoints(ax: "Axes", frame: Frame, stops: Array) -> None:
+    """Number the places where a route surfaces, and its goal, as the files of vehicles do; not more than
+    MOST_WAYPOINTS of them.
+
+    `stops` (n, 3) [m]: the start and the ends of all legs.
+    """
+    up = [n for n in range(1, len(stops)) if stops[n, 2] >= -SURFACE or n == len(stops) - 1]
+    step = -(-len(up) // MOST_WAYPOINTS)
+    ends = frame.scaled(stops)[:, :2]
+    look: dict[str, Any] = {"textcoords": "offset points", "xytext": (5, 4), "fontsize": 8, "zorder": 10}
+    for number, n in enumerate(up, 1):
+        # the goal's number must not lie on the one before
+        if n == up[-1] or (number % step == 0 and len(up) - number > step // 2):
+            ax.annotate(str(number), (ends[n, 0], ends[n, 1]), path_effects=halo(), **look)
 
 
 def draw_ends(ax: Any, points: Array, size: float = 1.0) -> None:

@@ -43,7 +43,9 @@ class Density:
         if self.directions < FEWEST:
             few = f"legs leave a node in {self.directions:.0f} directions of {SECTORS}"
             found.append(f"{few}, fewer than {FEWEST:.0f}")
-        cure = "routes are slower than they could be; take more nodes, or query with --polish or --within"
+        cure = (
+            "a query finds a slower route than there is; add --polish or --within to it, or take more nodes here"
+        )
         return f"{', and '.join(found)}: {cure}" if found else ""
 
     def __str__(self) -> str:

@@ -8,6 +8,7 @@ ends does.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,10 @@ SAME_SPEED = 0.02
 """The trims of a plan are another vehicle's if its speeds differ by more than this share."""
 ROUNDED = 1e-6
 """Depths in a plan's file are rounded by less than this [m]."""
+MOST_JUMP = 0.1
+"""Where one leg ends and the next begins, the current [m/s] that they meet in a step may differ by so much."""
 FLOWN_BESIDE = 1.5
-"""The first leg of a plan may end this many tolerances beside its stop; else it was planned in another water."""
+"""A leg of a plan may end this many tolerances beside its stop; else it was planned in another water."""
 ANOTHER = "give the scenario or the roadmap of the plan, or plan again"
 
 
@@ -82,19 +85,49 @@ def check_plan(path: Path, problem: Problem) -> None:
 
 
 def check_currents(path: Path, problem: Problem) -> None:
-    """Raise InputError unless the first leg of a plan, flown again, ends where the plan says.
+    """Raise InputError unless each leg of a plan, flown again, ends where the plan says.
 
     The problem leaves when the plan does.
     """
-    leg = path.legs[0]
-    rows = problem.evaluator.trace(leg.start, _edge(leg, leg.duration, leg.heading), problem.departure)
-    off = math.dist(rows[-1, 1:], leg.end)
-    most = FLOWN_BESIDE * max(problem.evaluator.integration.tolerance, leg.miss)
-    require(
-        off <= most,
-        f"leg 1 of the plan, flown in these currents, ends {off:,.0f} m from where the plan says: the plan is "
-        f"another scenario's, or the currents have changed since; {ANOTHER}; name newer currents by --currents",
-    )
+    last = problem.evaluator.flow.extent.t_hi
+    for n, leg in enumerate(path.legs, 1):
+        begins = problem.departure + (0.0 if path.frozen else leg.depart)
+        if begins + leg.duration > last:
+            return  # these currents end before: what is left cannot be compared
+        rows = problem.evaluator.trace(leg.start, _edge(leg, leg.duration, leg.heading), begins)
+        off = math.dist(rows[-1, 1:], leg.end)
+        most = FLOWN_BESIDE * max(problem.evaluator.integration.tolerance, leg.miss)
+        others = "is another scenario's, or the currents have changed since" if n == 1 else "was changed by hand"
+        cure = f"{ANOTHER}; name newer currents by --currents" if n == 1 else "plan again"
+        where = f"leg {n} of the plan, flown in these currents, ends {off:,.0f} m from where the plan says"
+        require(off <= most, f"{where}: the plan {others}; {cure}")
+
+
+def check_smooth(path: Path) -> None:
+    """Raise InputError unless the legs of a plan, where one ends and the next begins, meet nearly the same
+    current.
+
+    This needs no currents: the motion of a leg's trajectory less its own speed is the current that it meets.
+    """
+    met = [(_met(leg, True), _met(leg, False)) for leg in path.legs]
+    for n, ((_, before), (after, _)) in enumerate(pairwise(met), 2):
+        jump = math.dist(before, after)
+        where = f"legs {n - 1} and {n} of the plan meet currents {jump:.2f} m/s apart at one place"
+        require(jump <= MOST_JUMP, f"{where}, so the heading of one was changed; plan again")
+
+
+def _met(leg: Leg, at_first: bool) -> Array:
+    """Return the current (2,) [m/s] that a leg meets in the first or last step of its trajectory.
+
+    A step shorter than a second, which may be nothing but rounding, is taken with the step beside it.
+    """
+    rows = leg.trajectory
+    since = rows[:, 0] - rows[0, 0] if at_first else rows[-1, 0] - rows[:, 0]
+    far = np.flatnonzero(since >= min(1.0, leg.duration / 2))
+    first, second = (rows[0], rows[far[0]]) if at_first else (rows[far[-1]], rows[-1])
+    way = np.array([math.cos(leg.heading), math.sin(leg.heading)])
+    over_ground = (second[1:3] - first[1:3]) / max(second[0] - first[0], 1e-9)
+    return np.asarray(over_ground - leg.speed * math.cos(leg.glide_angle) * way)
 
 
 def _edge(leg: Leg, duration: float, heading: float) -> Edge:

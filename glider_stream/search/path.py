@@ -287,8 +287,8 @@ class Path:
         least = f"{self.least / 1000:,.1f} kJ" if self.unit == "J" else span(self.least)
         line = f"  no route costs less than {least}, by the greatest currents: this one at most {over:.1%} more"
         if self.likely_gain is not None:
-            line += f"; another round may gain {self.likely_gain:.2%}, an estimate"
-        return [line]
+            return [f"{line}; another round may gain {self.likely_gain:.2%}, an estimate"]
+        return [f"{line}; to look for a better one, --within 0.01; for a closer bound, `glider-stream bound`"]
 
     def __str__(self) -> str:
         if self.lonlat is None:

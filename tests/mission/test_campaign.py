@@ -160,7 +160,7 @@ def test_what_is_wrong_is_refused(folder, capsys, monkeypatch, arguments, senten
 
 
 def test_shipped_missions_are_whole():
-    assert {"box", "gyre", "strait", "ionian"} <= set(shipped_missions())
+    assert {"box", "gyre", "strait", "tide", "ionian"} <= set(shipped_missions())
     for name in shipped_missions():
         overrides = ["flow.file=currents.nc"] if name == "ionian" else []
         read = read_mission(name, overrides)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from helpers.small import SCENARIO, command, roadmap
@@ -14,6 +15,7 @@ from glider_stream.opened.replanning import at_fix
 from glider_stream.pilot.currents import dive_currents
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
+from glider_stream.search.flown_on import check_smooth
 from glider_stream.search.path import load_path
 from glider_stream.water.mapping.dive_files import read_dives
 
@@ -47,6 +49,27 @@ def test_a_plan_changed_by_hand_is_refused(plan, tmp_path, what):
     (tmp_path / "plan.json").write_text(json.dumps(table))
     with pytest.raises(InputError, match=f"{what}.*so the file was changed"):
         load_path(tmp_path / "plan.json")
+
+
+def test_a_heading_changed_by_hand_in_any_leg_is_found(plan, tmp_path):
+    """By the plan's own currents; and without them, by what two legs meet where one ends and the next begins."""
+    table = json.loads(plan.read_text())
+    table["legs"][2]["heading_rad"] += 0.7
+    (tmp_path / "plan.json").write_text(json.dumps(table))
+    changed = load_path(tmp_path / "plan.json")
+    with pytest.raises(InputError, match=r"leg 3 of the plan, flown in these currents, ends .* changed by hand"):
+        planner.replan(changed, (-60.0, 60.0), 200.0)
+    with pytest.raises(InputError, match="legs 2 and 3 of the plan meet currents"):
+        check_smooth(changed)
+    check_smooth(load_path(plan))
+
+
+def test_a_current_of_a_dive_is_not_compared_with_a_part_of_the_plans(plan):
+    path = load_path(plan)
+    # the list ended below, so the vehicle came up by itself
+    deep = replace(path, legs=path.legs[:1])
+    with pytest.raises(InputError, match=r"is from 0 m to .* m, not from the surface to the surface"):
+        planner.replan(deep, (-100.0, 100.0), 2.5 * path.legs[0].duration, dac=(0.1, 0.0))
 
 
 def test_a_fix_in_seconds_since_1970_and_a_current_in_cm_per_second(plan, capsys):

@@ -180,7 +180,7 @@ def test_a_profile_shows_the_seabed_where_it_is_near():
     shallow = scene.terrain._replace(bottom=raised, ground=raised, clearance=0.0)
     for terrain, said, ground in ((scene.terrain, "1,4", False), (shallow, "over the seabed", True)):
         figure = plot.plot_chart(scene.flow, terrain, scene.problem, plot.placed(scene.path, scene.problem))
-        (ax,) = (ax for ax in figure.findobj(lambda a: hasattr(a, "get_xlabel")) if "(b)" in ax.get_title("left"))
+        (ax,) = (ax for ax in figure.findobj(lambda a: hasattr(a, "scatter")) if "(b)" in ax.get_title("left"))
         assert said in ax.get_title("left")
         fills = [one for one in ax.collections if type(one).__name__ == "FillBetweenPolyCollection"]
         assert bool(fills) == ground
