@@ -1,6 +1,7 @@
 """Pilots: a policy makes orders from a fix and a forecast, once or at each call."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,10 +16,11 @@ from ..search.answer import planner_of
 from ..search.assembly import RoutePlanner
 from ..search.path import Path
 from ..water.inspect import is_steady
+from .assimilating import corrected
 from .depth_averaged import Chart, chart_of
 from .orders import Orders, Waypoints, trims_of, waypoints_of
 from .settings import Mission
-from .vehicle import Fix
+from .vehicle import Dive, Fix
 
 
 class Office:
@@ -66,6 +68,11 @@ class Office:
         path = (self.planner if steady else self.planner.leaving(since)).query(start, self.goal)
         return path if path.found and path.legs else None
 
+    def after(self, dives: Sequence[Dive]) -> "Office":
+        """Return the office with the forecast corrected by dives; this one if nothing is to correct."""
+        problem = corrected(self.problem, self.mission, dives)
+        return self if problem is self.problem else Office(problem, self.mission)
+
     def towards(self, stops: Array) -> Waypoints:
         """Return the orders to head for places (n, 2) [m] with the deepest yos at the fastest glide."""
         count = len(stops)
@@ -105,6 +112,14 @@ class Replan(Policy):
         return Plan(orders, path.trajectory[:, 1:3], path.travel_time)
 
 
+class Assimilate(Replan):
+    """The fastest route in the forecast corrected by the currents of all dives so far, again at each call."""
+
+    def plan(self, office: Office, fix: Fix) -> Plan | None:
+        """Return the best route from a fix in the corrected forecast."""
+        return super().plan(office.after(fix.dives), fix)
+
+
 class OpenLoop(Replan):
     """The fastest route in the forecast, made once."""
 
@@ -142,6 +157,7 @@ class DepthAveraged(Policy):
 POLICIES: dict[str, type[Policy]] = {
     "open-loop": OpenLoop,
     "replan": Replan,
+    "assimilate": Assimilate,
     "straight": Straight,
     "depth-averaged": DepthAveraged,
     "omniscient": Omniscient,
