@@ -26,15 +26,15 @@ from .vehicle import Dive, Fix
 class Office:
     """What a pilot plans with in one current: a problem, its planner and chart, each made when it is needed."""
 
-    def __init__(self, problem: Problem, mission: Mission) -> None:
-        """Keep the problem."""
-        self.problem, self.mission = problem, mission
+    def __init__(self, problem: Problem, mission: Mission, road: Roadmap | None = None) -> None:
+        """Keep the problem, and in a steady current its roadmap, if that is known."""
+        self.problem, self.mission, self._road = problem, mission, road
 
     @cached_property
     def planner(self) -> RoutePlanner:
         """The planner of routes that come up as the mission asks; in a steady current it has a roadmap's legs."""
         steady = is_steady(self.problem.evaluator.flow)
-        road: Roadmap | None = build_roadmap(self.problem) if steady else None
+        road = build_roadmap(self.problem) if steady and self._road is None else self._road
         return planner_of(self.problem, road, self.mission.pilot.rule)
 
     @cached_property
@@ -88,6 +88,13 @@ class Plan:
     takes: float
 
 
+def plan_of(path: Path, office: Office, steering: str | None = None) -> Plan:
+    """Return a route as orders for a `steering`, the mission's if it is None."""
+    by_trims = (steering or office.mission.vehicle.steering) == "trims"
+    orders = trims_of(path) if by_trims else waypoints_of(path, office.angle)
+    return Plan(orders, path.trajectory[:, 1:3], path.travel_time)
+
+
 class Policy(ABC):
     """A way to make orders; `replans`: again at each call; `knows`: it plans in the true current."""
 
@@ -105,11 +112,7 @@ class Replan(Policy):
     def plan(self, office: Office, fix: Fix) -> Plan | None:
         """Return the best route from a fix."""
         path = office.route(fix)
-        if path is None:
-            return None
-        by_trims = office.mission.vehicle.steering == "trims"
-        orders = trims_of(path) if by_trims else waypoints_of(path, office.angle)
-        return Plan(orders, path.trajectory[:, 1:3], path.travel_time)
+        return None if path is None else plan_of(path, office)
 
 
 class Assimilate(Replan):
