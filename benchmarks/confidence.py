@@ -1,7 +1,7 @@
 """Whether routes arrive as often as is said: chosen by some members of an ensemble, flown in others.
 
-`python benchmarks/confidence.py strait box gyre -o benchmarks/records/confidence.json`: for each mission, routes are
-planned and chosen in 30 draws of the forecast's error, then flown in 200 others by the simulator of missions.
+`python benchmarks/confidence.py strait box gyre -o benchmarks/records/confidence.json`: for each mission, routes
+are planned and chosen in 30 draws of the forecast's error, then flown in 200 others by the simulator of missions.
 """
 
 import argparse

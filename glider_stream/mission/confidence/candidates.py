@@ -81,11 +81,11 @@ def _stops_of(plan: Plan, path: Path) -> Array | None:
 class Search:
     """What is searched in an ensemble, once: the shared roadmap, and the candidates."""
 
-    def __init__(self, ensemble: Ensemble) -> None:
-        """Find the legs in all members, where the currents are steady."""
+    def __init__(self, ensemble: Ensemble, legs: bool = True) -> None:
+        """Find the legs in all members, where the currents are steady; none if `legs` is False."""
         self.ensemble = ensemble
         steady = is_steady(ensemble.forecast.evaluator.flow)
-        self.shared: SharedRoadmap | None = shared_roadmap(ensemble) if steady else None
+        self.shared: SharedRoadmap | None = shared_roadmap(ensemble) if steady and legs else None
         road = None if self.shared is None else self.shared.forecast
         self.office = Office(ensemble.forecast, ensemble.mission, road)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
 from ...kernels.flow import OceanGrid
@@ -14,6 +15,7 @@ from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
 from ...water.ocean import OceanFlow
 from ...water.ocean.ensemble import member_labels
+from ..orders import is_up
 from ..settings import Mission
 from ..world import Worlds
 
@@ -47,13 +49,21 @@ class Ensemble:
             yield self._member(number)
 
     def _member(self, number: int) -> Problem:
-        if number in self.members:
-            return self.members[number]
-        assert self.worlds is not None
-        made = self._like_the_forecast(self.worlds.world(number).forecast)
+        made = self.members.get(number)
+        if made is None:
+            assert self.worlds is not None
+            made = self.worlds.world(number).forecast
         if self.count <= KEPT:
             self.members[number] = made
-        return made
+        return self._like_the_forecast(made)
+
+    def between(self, start: Array, goal: Array) -> "Ensemble":
+        """Return the same ensemble for routes from a start to a goal (3,) [m], both at the surface."""
+        for point, name in ((start, "start"), (goal, "goal")):
+            self.forecast.check_point(point, name)
+            up = f"a route with confidence begins and ends at the surface; got a {name} at {-point[2]:g} m"
+            require(is_up(float(point[2])), up)
+        return replace(self, forecast=replace(self.forecast, start=start, goal=goal))
 
     def _like_the_forecast(self, member: Problem) -> Problem:
         """Return the forecast's problem with a member's current and terrain."""
