@@ -113,7 +113,8 @@ class Confidence:
             return []
         order = sorted(range(len(self.flights)), key=lambda k: (*self.criterion.rank(self.flights[k].time), k))
         names = [f"{q:.0%} by (h)" for q in QUANTILES]
-        lines = [f"  {'candidate':<30}{'arrived (%)':<18}" + "".join(f"{name:<14}" for name in names)]
+        head = f"  {'candidate':<30}{'arrived (%)':<18}" + "".join(f"{name:<14}" for name in names)
+        lines = [head.rstrip()]
         for k in order[:SHOWN]:
             each = self.flights[k]
             times = [quantile(each.time, q) for q in QUANTILES]

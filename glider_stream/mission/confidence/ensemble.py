@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import OceanGrid
+from ...kernels.flow import Flow, OceanGrid
 from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
@@ -91,17 +91,7 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     """
     scenarios = _scenarios(mission.scenario, files)
     problems = [_timed(scenario.problem()) for scenario in scenarios]
-    flows = [problem.evaluator.flow for problem in problems]
-    first = flows[0]
-    assert isinstance(first, OceanGrid)
-    values = np.zeros_like(first.values)
-    for n, flow in enumerate(flows):
-        alike = isinstance(flow, OceanGrid) and flow.values.shape == first.values.shape
-        alike = alike and np.array_equal(flow.times, first.times) and np.array_equal(flow.levels, first.levels)
-        require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
-        values += flow.values / len(flows)
-    fastest = max(flow.extent.max_speed for flow in flows)
-    mean = first._replace(values=values, extent=first.extent._replace(max_speed=fastest))
+    mean = _mean([problem.evaluator.flow for problem in problems])
     forecast = replace(problems[0], evaluator=replace(problems[0].evaluator, flow=mean))
     until = forecast.departure + mission.arrival.longest
     known = forecast.evaluator.flow.extent
@@ -116,6 +106,19 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
         f"{len(problems)} members of {names}; the forecast is their mean",
         members=dict(zip(numbers, problems, strict=True)),
     )
+
+
+def _mean(flows: Sequence[Flow]) -> OceanGrid:
+    """Return the mean of currents on one grid; InputError if their points or times differ."""
+    grids = [flow for flow in flows if isinstance(flow, OceanGrid)]
+    first, total = grids[0], np.zeros_like(grids[0].values)
+    for n, grid in enumerate(grids):
+        alike = grid.values.shape == first.values.shape and np.array_equal(grid.times, first.times)
+        alike = alike and np.array_equal(grid.levels, first.levels) and grid.extent[:4] == first.extent[:4]
+        require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
+        total += grid.values
+    fastest = max(grid.extent.max_speed for grid in grids)
+    return first._replace(values=total / len(grids), extent=first.extent._replace(max_speed=fastest))
 
 
 def first_member(files: Sequence[str | Path]) -> list[str]:

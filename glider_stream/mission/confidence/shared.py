@@ -5,6 +5,7 @@ the forecast. What they cannot share is the fan of controls, which the current b
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def _with(road: Roadmap, values: dict[str, Array], kept: Bools) -> Roadmap:
     """Return a roadmap with other values of its edges, of which only some are kept."""
     columns = {name: getattr(road, name) for name in EDGE_FIELDS} | values
     before = np.concatenate([[0], np.cumsum(kept)])
-    edges = {name: np.ascontiguousarray(column[kept]) for name, column in columns.items()}
+    edges: dict[str, Any] = {name: np.ascontiguousarray(column[kept]) for name, column in columns.items()}
     return replace(road, indptr=before[road.indptr], target=road.target[kept], node_counts=None, **edges)
 
 
