@@ -1,6 +1,6 @@
 """The flow map against brute force, on fields that it was not tuned on: what it finds, how soon, how exactly.
 
-python benchmarks/completeness.py [--sources 16] [--quick] [--beyond] [-o benchmarks/records/completeness.json]
+python benchmarks/completeness.py [--sources 16] [--quick] [--beyond] [--rising] [--only FIELD] [-o RECORD.json]
 
 For each field, pairs from random nodes to their 27 nearest neighbours, and to random ones of all others. A
 connection is true where brute force (a scan of 48 x 96 controls, Newton from every local minimum of the miss) or
@@ -20,11 +20,11 @@ from typing import Any
 
 import numba
 import numpy as np
-from completeness_fields import BEYOND, fields
+from completeness_fields import BEYOND, fields, rising_fields
 
 from glider_stream.evaluation import brute_force
 from glider_stream.kernels.edges import MISS, STATUS, TIME, Status
-from glider_stream.kernels.flow import Grid
+from glider_stream.kernels.flow import Grid, RisingGrid
 from glider_stream.roadmap.evaluator import Evaluator
 from glider_stream.roadmap.neighbours import AllNodes, Nearest, as_csr
 from glider_stream.roadmap.verify import replayed_misses
@@ -68,7 +68,7 @@ def connect(case: Case, source: Any, targets: Any) -> tuple[Any, Any, Any]:
 def compare(case: Case, source: Any, target: Any, rows: Any, best: Any) -> tuple[dict[str, Any], list[Any]]:
     """Brute force's least times beside the flow map's outcomes; the pairs that it misses, or is late for."""
     position = case[0]
-    grid, found = isinstance(case[2].flow, Grid), rows[:, STATUS] == Status.CONNECTED
+    grid, found = isinstance(case[2].flow, Grid | RisingGrid), rows[:, STATUS] == Status.CONNECTED
     only = np.flatnonzero(found & np.isinf(best))
     off = end_distances(case, source[only], target[only], rows[only])
     false = only[off >= MOST_OFF[grid]]
@@ -132,7 +132,7 @@ def measure(name: str, case: Case, size: dict[str, int], threads: int) -> dict[s
     wide = np.sort(rng.choice(len(position), size["fans"], replace=False))
     result["reachable"], result["edges"] = reachable_share(case, wide)
     bounds = all(result[key] >= bound for key, bound in BOUNDS.items())
-    close = result["most_off_m"] < MOST_OFF[isinstance(case[2].flow, Grid)]
+    close = result["most_off_m"] < MOST_OFF[isinstance(case[2].flow, Grid | RisingGrid)]
     result["holds"] = bool(bounds and close and not result["false_near"] and not result["false_all"])
     return result | {"seconds": round(time.perf_counter() - began, 1)}
 
@@ -170,6 +170,8 @@ def main() -> None:
     parser.add_argument("--sources", type=int, default=16)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--beyond", action="store_true", help=f"only {BEYOND}, which is held to no bound")
+    parser.add_argument("--rising", action="store_true", help="the flows with a vertical part instead")
+    parser.add_argument("--only", help="only the field with this name")
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
     size = {"sources": options.sources, "others": 100, "replays": 200, "fans": 40}
@@ -182,8 +184,9 @@ def main() -> None:
     found = "| true, {} | found | in time "
     print("| field " + found.format("near") + found.format("all") + "| most off | 99.9 % | reachable |")
     print("|" + 10 * "---|")
-    cases, record["rows"] = fields(), []
-    for name in [BEYOND] if options.beyond else [name for name in cases if name != BEYOND]:
+    cases, record["rows"] = rising_fields() if options.rising else fields(), []
+    names = [BEYOND] if options.beyond else [name for name in cases if name != BEYOND]
+    for name in [name for name in names if options.only in (None, name)]:
         case = cases[name]
         row = measure(name, case, size, threads)
         record["rows"].append(row)
@@ -196,7 +199,8 @@ def main() -> None:
             flush=True,
         )
     count = 3_000 if options.quick else 100_000
-    odd = {name: odd_pairs(cases[name], count) for name in ("seed box", "double gyre, swinging")}
+    boxed = ("cells in a grid",) if options.rising else ("seed box", "double gyre, swinging")
+    odd = {name: odd_pairs(cases[name], count) for name in boxed if options.only in (None, name)}
     print(f"of {count:,} random pairs, degenerate ones among them, with a wrong status or NaN: {odd}")
     if options.output:
         options.output.write_text(json.dumps(record | {"odd_pairs": odd}, indent=1) + "\n")

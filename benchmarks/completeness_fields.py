@@ -12,7 +12,16 @@ from glider_stream.roadmap.steering import FlowMapMethod, IntegrationSettings
 from glider_stream.scenario import read_scenario
 from glider_stream.vehicle.polar import polar
 from glider_stream.vehicle.presets import PRESETS
-from glider_stream.water.analytic import DoubleGyre, Rankine, Vortex, Vortices
+from glider_stream.water.analytic import (
+    Abc,
+    DoubleGyre,
+    InternalWave,
+    Rankine,
+    Rolls,
+    Upwelling,
+    Vortex,
+    Vortices,
+)
 from glider_stream.water.sampled import sample_flow
 
 DEPTHS = (-330.0, 0.0)
@@ -77,4 +86,28 @@ def fields() -> dict[str, tuple[Any, float, Evaluator]]:
         "double gyre": (gyres, 0.0, judge(steady, slocum, gyre)),
         "double gyre, swinging": (gyres, 1234.0, judge(swinging, slocum, gyre)),
         BEYOND: (on_levels(3, 900, 450, four), 0.0, judge(fierce)),
+    }
+
+
+def rising_fields() -> dict[str, tuple[Any, float, Evaluator]]:
+    """The same of flows with a vertical part: up to half of the fastest sink, 0.86 m/s."""
+    box = IntegrationSettings(5.0, 125, 5.0)
+    paper = polar(PRESETS["paper"])
+    four, rng = [0.0, -100.0, -200.0, -300.0], np.random.default_rng(7)
+    anywhere = rng.uniform([-450, -450, -300], [450, 450, 0], (900, 3))
+
+    def judge(flow: Any) -> Evaluator:
+        return Evaluator(flow, OpenWater(-math.inf), paper, FlowMapMethod(), box)
+
+    cells = Rolls(w=0.43, width=300.0, depth=300.0).kernel(DEPTHS)
+    wave = InternalWave(w=0.43, length=400.0, depth=300.0, period=900.0).kernel(DEPTHS)
+    chaotic = Abc(0.3, 0.25, 0.18, 500.0).kernel(DEPTHS)
+    sides = (-2200.0, 2200.0)
+    upwelling = Upwelling(0.1, 0.2, 0.0, stretch=-1.3e-3, x=sides).kernel(DEPTHS)
+    return {
+        "convection cells": (on_levels(11, 900, 450, four), 0.0, judge(cells)),
+        "internal wave": (on_levels(12, 900, 450, four), 321.0, judge(wave)),
+        "ABC, any depth": (anywhere, 0.0, judge(chaotic)),
+        "upwelling, stretched": (on_levels(13, 900, 450, four), 0.0, judge(upwelling)),
+        "cells in a grid": (on_levels(14, 900, 450, four), 0.0, judge(in_grid(cells, (15, 15, 10)))),
     }

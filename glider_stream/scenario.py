@@ -16,7 +16,7 @@ from .base.checks import FASTEST, LONGEST
 from .base.errors import InputError
 from .base.settings import from_kinds, from_table, require
 from .base.toml import check_depth, to_toml
-from .kernels.flow import Flow
+from .kernels.flow import Flow, max_rise, rises
 from .kernels.terrain import OpenWater, Seabed, Terrain
 from .roadmap.evaluator import Evaluator
 from .roadmap.inputs import KEYS, located, names_of, renamed
@@ -25,7 +25,7 @@ from .roadmap.nodes import SAMPLERS, Sampler, YoSampler
 from .roadmap.problem import Problem
 from .roadmap.roadmap import Roadmap
 from .roadmap.slices import SlicedRoadmap
-from .roadmap.steering import METHODS, IntegrationSettings, Method
+from .roadmap.steering import METHODS, FlowMapMethod, IntegrationSettings, Method
 from .vehicle.cost import Cost, Energy, TravelTime, energy_from_table
 from .vehicle.models import Glider
 from .vehicle.polar import polar
@@ -189,6 +189,15 @@ class Scenario:
             slices=self._slices(flow),
         )
 
+    def _told_rise(self, flow: Flow) -> str:
+        """Return a text on the vertical part of a flow; empty if it has none."""
+        if not rises(flow):
+            return ""
+        line = (
+            "" if isinstance(self.method, FlowMapMethod) else ", which the controls of this method do not foresee"
+        )
+        return f", with a vertical current of up to {max_rise(flow):.3g} m/s{line}"
+
     @property
     def departure(self) -> float:
         """The time when gliders leave their nodes [s]."""
@@ -254,6 +263,7 @@ class Scenario:
             off = sampling_error(exact, flow, *box, (lo[2], hi[2]))
             spacing = ", ".join(f"{step:g}" for step in self.flow.sampled)
             text += f", sampled every {spacing} m, off by at most {off:.2g} m/s"
+        text += self._told_rise(flow)
         if self.terrain == TerrainSettings():
             return flow, OpenWater(-np.inf), text
         if self.terrain == TerrainSettings(max_depth=self.terrain.max_depth):

@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .cache import entry_point, inlined, kernel
+from .cache import entry_point, inlined, kernel, making
 from .control import NO_CONTROL, candidate_controls, control_of, control_towards, direction_of
 from .cost import edge_cost
 from .edges import (
     BLOCKED,
+    CARRIED_AWAY,
     CLEARANCE_SPACING,
     CONNECTED,
     COST,
@@ -36,7 +37,7 @@ from .flight import (
     stayed_inside,
     widen,
 )
-from .flow import Array, Numbers, carry
+from .flow import Array, Numbers, carry, max_rise
 from .motion import (
     LANE_STEP,
     LANE_T,
@@ -51,6 +52,7 @@ from .motion import (
     arrival_window,
     closest_approach,
     is_clear,
+    step_on,
 )
 from .place import Pair, Place
 
@@ -66,6 +68,8 @@ flow's."""
 TRY_BEFORE_X, TRY_BEFORE_Y = _ROWS[12:]
 """The place of the lane at the last check [m]."""
 TRY_ROWS = _ROWS.stop
+HEADINGS = 8
+"""So many headings are flown before a pair counts as carried away."""
 LOOK_EVERY = 12
 """A path that is not yet in its arrival window is checked after this many steps."""
 
@@ -116,6 +120,7 @@ def begin_pair(medium, steering, pair, controls, edge):
     count = 0
     if status == CONNECTED:
         slowest = abs(pair.goal.z - pair.start.z) / (integration.steps * integration.dt)
+        slowest -= max_rise(medium.flow)
         count = candidate_controls(steering, medium.flow, medium.polar, pair, slowest, controls)
         status = CURRENT_TOO_STRONG if count == NO_CONTROL else (TOO_FAR if count == 0 else NO_HIT)
     store(edge, no_edge(status))
@@ -291,3 +296,66 @@ def connect_nodes(medium, steering, pairs, edges, first, last):
             if not _launch(medium, steering, pairs, queue, edges, lanes, n):
                 rest(lanes, n)
                 flying -= 1
+
+
+@entry_point(nogil=True)
+def connect_rising(medium, steering, pairs, edges, first, last):
+    """As `connect_nodes`, in a flow with a vertical part: one control after another.
+
+    When a path reaches a depth is not known before it is flown, so no control is left out beforehand.
+    """
+    controls = np.empty((steering.candidates, 2))
+    for n in range(first, last):
+        for k in range(pairs.indptr[n], pairs.indptr[n + 1]):
+            pair, edge = pair_at(pairs, n, k), edges[k]
+            count = begin_pair(medium, steering, pair, controls, edge)
+            for m in range(count):
+                angle, heading = controls[m]
+                c = control_towards(medium.polar, direction_of(pair), angle, heading)
+                miss, duration = closest_approach(medium.flow, pair, c, medium.integration)
+                cost = edge_cost(medium.cost, duration)
+                known = edge[STATUS] == CONNECTED
+                if not miss < medium.integration.tolerance or duration == 0.0 or (known and cost >= edge[COST]):
+                    continue
+                if _stays_clear(medium, pair.start, c, duration):
+                    found = Edge(CONNECTED, duration, cost, c.glide_angle, c.heading, c.speed, miss)
+                    store(edge, found)
+                elif edge[STATUS] == NO_HIT:
+                    store(edge, no_edge(BLOCKED))
+
+
+@making
+def _stays_clear(medium, start, through, duration):
+    """Return whether a leg stays where the terrain allows."""
+    dt = medium.integration.dt
+    return is_clear(medium.flow, medium.terrain, start, through, duration, dt, CLEARANCE_SPACING)
+
+
+@entry_point(nogil=True)
+def carried_away(medium, pairs, edges, first, last):
+    """Set CARRIED_AWAY, instead of NO_HIT, for pairs of source[first:last] whose depth no steep glide reaches.
+
+    Of the steepest glide HEADINGS headings are flown for the horizon.
+    """
+    flow, polar, dt = medium.flow, medium.polar, medium.integration.dt
+    for n in range(first, last):
+        for k in range(pairs.indptr[n], pairs.indptr[n + 1]):
+            if edges[k, STATUS] != NO_HIT:
+                continue
+            pair = pair_at(pairs, n, k)
+            direction = direction_of(pair)
+            way = 2.0 * direction - 1.0
+            arrives = False
+            for m in range(HEADINGS):
+                c = control_towards(polar, direction, polar.steepest[direction], 2.0 * math.pi * m / HEADINGS)
+                here = pair.start
+                for step in range(medium.integration.steps):
+                    x, y, z = step_on(flow, here, c, dt)
+                    here = Place(x, y, z, pair.start.t + (step + 1) * dt)
+                    if (z - pair.goal.z) * way >= 0.0:
+                        arrives = True
+                        break
+                if arrives:
+                    break
+            if not arrives:
+                store(edges[k], no_edge(CARRIED_AWAY))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from .cache import inlined, kernel
 from .control import Polar, direction_of, vertical_speed
 from .cost import CostRates
-from .flow import Array, Flow, contains
+from .flow import Array, Flow, contains, max_rise
 from .motion import Integration
 from .terrain import Terrain
 
@@ -22,6 +22,7 @@ class Status(IntEnum):
     NO_HIT = 4
     BLOCKED = 5
     OUTSIDE_FLOW = 6
+    CARRIED_AWAY = 7
 
 
 CONNECTED = int(Status.CONNECTED)
@@ -31,6 +32,7 @@ TOO_FAR = int(Status.TOO_FAR)
 NO_HIT = int(Status.NO_HIT)
 BLOCKED = int(Status.BLOCKED)
 OUTSIDE_FLOW = int(Status.OUTSIDE_FLOW)
+CARRIED_AWAY = int(Status.CARRIED_AWAY)
 
 CLEARANCE_SPACING = 5.0
 """A leg is checked for land and seabed at places this far apart [m]."""
@@ -97,7 +99,8 @@ def quick_status(medium, pair):
         return SAME_DEPTH
     direction = direction_of(pair)
     horizon = integration.steps * integration.dt
-    if vertical_speed(polar, direction, polar.steepest[direction]) * horizon < abs(q.z - p.z):
+    fastest = vertical_speed(polar, direction, polar.steepest[direction]) + max_rise(flow)
+    if fastest * horizon < abs(q.z - p.z):
         return TOO_FAR
     reach = (polar.best_horizontal[direction] + flow.extent.max_speed) * horizon + integration.tolerance
     if math.hypot(q.x - p.x, q.y - p.y) > reach:

@@ -13,10 +13,23 @@ from numpy.typing import NDArray
 
 from .cache import entry_point, inlined, kernel, making
 from .control import angle_of_vertical_speed, control_towards, vertical_speed
-from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_for, hangar, place, rest
-from .flow import Array, Numbers
-from .motion import LANE_W, LANE_X, LANE_Y, LANE_Z, LANES
-from .patch import MAX_LEVELS, Cell, Guesses, Nodes, Slab, fill_patch, guess_in_patch, longer, wants_halving
+from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_to, hangar, place, rest
+from .flow import Array, Numbers, max_rise
+from .motion import LANE_T, LANE_W, LANE_X, LANE_Y, LANE_Z, LANES
+from .patch import (
+    LANDING_COLUMNS,
+    MAX_LEVELS,
+    Cell,
+    Guesses,
+    Nodes,
+    Slab,
+    any_wanted_around,
+    fill_patch,
+    guess_in_patch,
+    landed_corners,
+    longer,
+    wants_halving,
+)
 from .place import Place
 
 VERTEX_ANGLE, VERTEX_HEADING, VERTEX_THROUGH = range(3)
@@ -44,11 +57,15 @@ class FlowMap(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """The place and time at which the controls of a fan start, their direction, and their steps `dt` [s]."""
+    """The place and time at which the controls of a fan start, their direction, and their steps `dt` [s].
+
+    In a flow that rises a control flies for `longest` [s] at most.
+    """
 
     origin: Place
     direction: int
     dt: float
+    longest: float
 
 
 class Sweep(NamedTuple):
@@ -77,7 +94,7 @@ class Mesh(NamedTuple):
 
     `rows` (angles,) the glide angles [rad] of the coarsest mesh, `unit` the size of its cells on the lattice;
     `lattice` says which vertex lies where, -1 where none does; `vertex` (at least all, 3), `landing` (at least
-    all, 2 levels): x, y [m] at each level.
+    all, LANDING_COLUMNS levels): the landing at each level.
     """
 
     rows: Array
@@ -88,7 +105,7 @@ class Mesh(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What a look into the cells of a fan needs; `patches` (3, 6, 2) and `corners` (CORNERS,) are scratch."""
+    """What a look into the cells of a fan needs; `patches` (3, 6, 3) and `corners` (CORNERS,) are scratch."""
 
     nodes: Nodes
     sweep: Sweep
@@ -123,26 +140,27 @@ def layers_outward(bins, z, outward, deepest, heights, layers):
 
 
 @making
-def levels_in_reach(polar, bins, sweep):
+def levels_in_reach(medium, bins, sweep):
     """Return the levels that a fan may reach within its horizon."""
-    direction, z = sweep.launch.direction, sweep.launch.origin.z
+    polar, direction, z = medium.polar, sweep.launch.direction, sweep.launch.origin.z
     heights, layers = np.empty(MAX_LEVELS), np.empty(MAX_LEVELS, np.int64)
     outward = outward_of(direction, sweep.backward)
     count = layers_outward(bins, z, outward, sweep.deepest, heights, layers)
-    furthest = vertical_speed(polar, direction, polar.steepest[direction]) * sweep.horizon * IN_TIME
+    fastest = vertical_speed(polar, direction, polar.steepest[direction]) + max_rise(medium.flow)
+    furthest = fastest * sweep.horizon * IN_TIME
     while count > 1 and abs(heights[count - 2] - z) > furthest:
         count -= 1
     return Levels(heights[:count], layers[:count])
 
 
 @kernel
-def fan_rows(polar, direction, nearest, horizon, rows):
+def fan_rows(polar, direction, slowest, rows):
     """Glide angles of the coarsest mesh's rows, rising, into `rows`; False where no level is in reach.
 
-    From the shallowest that rises or sinks `nearest` [m] within the horizon [s], in even ratios of the vertical
-    speed: so a row that just misses a level in time is late by one ratio at most.
+    From the shallowest with the vertical speed `slowest` [m/s], which reaches a level in time, in even ratios of
+    the vertical speed: so a row that just misses a level in time is late by one ratio at most.
     """
-    shallow = angle_of_vertical_speed(polar, direction, nearest / horizon)
+    shallow = angle_of_vertical_speed(polar, direction, slowest)
     steep = polar.steepest[direction]
     if not shallow < steep:
         return False
@@ -155,12 +173,13 @@ def fan_rows(polar, direction, nearest, horizon, rows):
 
 
 @kernel
-def _launch(polar, launch, heights, vertex, one, lanes, n):
+def _launch(medium, launch, heights, vertex, one, lanes, n):
     """Start lane n with the control of a vertex, to the first level."""
-    c = control_towards(polar, launch.direction, vertex[one, VERTEX_ANGLE], vertex[one, VERTEX_HEADING])
+    c = control_towards(medium.polar, launch.direction, vertex[one, VERTEX_ANGLE], vertex[one, VERTEX_HEADING])
     place(lanes, n, launch.origin, c)
     lanes[FAN_VERTEX, n], lanes[FAN_LEVEL, n] = one, 0.0
-    fly_for(lanes, n, (heights[0] - launch.origin.z) / c.w, launch.dt)
+    time = (heights[0] - launch.origin.z) / c.w
+    fly_to(medium.flow, lanes, n, heights[0], time, launch.longest, launch.dt)
 
 
 @kernel
@@ -175,7 +194,7 @@ def land_on_levels(medium, launch, heights, vertex, landing, first, last, lanes)
     for n in range(LANES):
         rest(lanes, n)
         if following < last:
-            _launch(medium.polar, launch, heights, vertex, following, lanes, n)
+            _launch(medium, launch, heights, vertex, following, lanes, n)
             following += 1
             flying += 1
     while flying > 0:
@@ -184,13 +203,18 @@ def land_on_levels(medium, launch, heights, vertex, landing, first, last, lanes)
             if lanes[LANE_LEFT, n] > 0.0:
                 continue
             one, level = int(lanes[FAN_VERTEX, n]), int(lanes[FAN_LEVEL, n])
-            landing[one, 2 * level], landing[one, 2 * level + 1] = lanes[LANE_X, n], lanes[LANE_Y, n]
+            landed = LANDING_COLUMNS * level
+            since = abs(lanes[LANE_T, n] - launch.origin.t)
+            landing[one, landed], landing[one, landed + 1] = lanes[LANE_X, n], lanes[LANE_Y, n]
+            landing[one, landed + 2] = since if lanes[LANE_X, n] == lanes[LANE_X, n] else math.nan
             if level + 1 < vertex[one, VERTEX_THROUGH]:
                 lanes[LANE_Z, n] = heights[level]
                 lanes[FAN_LEVEL, n] = level + 1
-                fly_for(lanes, n, (heights[level + 1] - heights[level]) / lanes[LANE_W, n], launch.dt)
+                time = (heights[level + 1] - heights[level]) / lanes[LANE_W, n]
+                left = max(launch.longest - since, launch.dt)
+                fly_to(medium.flow, lanes, n, heights[level + 1], time, left, launch.dt)
             elif following < last:
-                _launch(medium.polar, launch, heights, vertex, following, lanes, n)
+                _launch(medium, launch, heights, vertex, following, lanes, n)
                 following += 1
             else:
                 rest(lanes, n)
@@ -202,10 +226,10 @@ def landings(medium, launch, height, angle, heading):
     """Return the places x, y (n, 2) [m] where controls `angle` (n,), `heading` (n,) [rad] reach a height [m]."""
     vertex = np.ones((angle.size, 3))
     vertex[:, VERTEX_ANGLE], vertex[:, VERTEX_HEADING] = angle, heading
-    landing = np.empty((angle.size, 2))
+    landing = np.empty((angle.size, LANDING_COLUMNS))
     first = np.int64(0)
     land_on_levels(medium, launch, np.array([height]), vertex, landing, first, angle.size, hangar(FAN_ROWS))
-    return landing
+    return landing[:, :2].copy()
 
 
 @making
@@ -213,17 +237,19 @@ def coarsest_mesh(steering, rows, levels):
     """Return a mesh without vertices."""
     unit = 2 << steering.generations
     lattice = np.full(((rows.size - 1) * unit + 1, steering.headings * unit), -1, np.int32)
-    return Mesh(rows, unit, lattice, np.empty((512, 3)), np.empty((512, 2 * levels)))
+    return Mesh(rows, unit, lattice, np.empty((512, 3)), np.empty((512, LANDING_COLUMNS * levels)))
 
 
 @kernel
-def coarsest_cells(polar, bins, sweep, levels, mesh, cells):
+def coarsest_cells(medium, bins, sweep, levels, mesh, cells):
     """Write the cells of the coarsest mesh, each with its levels, into `cells`; return their number."""
     direction, z = sweep.launch.direction, sweep.launch.origin.z
+    rise = max_rise(medium.flow)
     count = 0
     for i in range(mesh.rows.size - 1):
         # a cell takes part where its steeper row is in time; the other flies on for a ratio longer
-        furthest = vertical_speed(polar, direction, mesh.rows[i + 1]) * sweep.horizon * IN_TIME
+        fastest = vertical_speed(medium.polar, direction, mesh.rows[i + 1]) + rise
+        furthest = fastest * sweep.horizon * IN_TIME
         through = 0
         while through < levels.height.size and abs(levels.height[through] - z) <= furthest:
             through += 1
@@ -290,6 +316,7 @@ def fill_patches(look, quarter, k):
     else:
         origin = look.sweep.launch.origin
         patches[1, :, 0], patches[1, :, 1] = origin.x, origin.y
+        patches[1, :, 2] = 0.0
         patches[1, 4:] = 0.0
 
 
@@ -306,6 +333,11 @@ def look_into_quarter(look, cell, quarter, may_halve, rows, count):
         if not (cell[CELL_LEVELS] >> k) & 1:
             continue
         fill_patches(look, quarter, k)
+        landed = landed_corners(look.patches[0])
+        if landed < 4:  # a flow that rises carries some of its controls away
+            if may_halve and landed > 0 and any_wanted_around(look.nodes, levels.layer[k], look.patches):
+                bent |= 1 << k
+            continue
         if may_halve and wants_halving(look.nodes, levels.layer[k], look.patches):
             bent |= 1 << k
             continue
@@ -360,19 +392,20 @@ def fan_guesses(medium, steering, nodes, sweep, guesses, lanes):
 
     One generation of cells after another: their vertices fly, then their quarters are looked into.
     """
-    levels = levels_in_reach(medium.polar, nodes.bins, sweep)
+    levels = levels_in_reach(medium, nodes.bins, sweep)
     launch, reached = sweep.launch, levels.height.size
     if reached == 0:
         return guesses
     rows = np.empty(steering.angles)
     # between levels, the nodes of the first layer may lie as near as they like
     nearest = abs(levels.height[0] - launch.origin.z) if nodes.bins.aligned else 0.0
-    if not fan_rows(medium.polar, launch.direction, nearest, sweep.horizon, rows):
+    slowest = nearest / sweep.horizon - max_rise(medium.flow)
+    if not fan_rows(medium.polar, launch.direction, slowest, rows):
         return guesses
     mesh = coarsest_mesh(steering, rows, reached)
     cells = np.empty((rows.size * steering.headings, 4), np.int64)
-    patches, corners = np.empty((3, 6, 2)), np.empty(CORNERS, np.int64)
-    waiting = coarsest_cells(medium.polar, nodes.bins, sweep, levels, mesh, cells)
+    patches, corners = np.empty((3, 6, 3)), np.empty(CORNERS, np.int64)
+    waiting = coarsest_cells(medium, nodes.bins, sweep, levels, mesh, cells)
     done, vertices, generation = 0, 0, 0
     while done < waiting:
         most = vertices + CORNERS * (waiting - done)

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from .cache import inlined, kernel, making
-from .flow import contains_box
+from .cache import in_kernels, inlined, kernel, making
+from .flow import Array, Flow, by_rise, contains_box, rises
 from .motion import (
     LANE_ROWS,
     LANE_STEP,
@@ -17,17 +17,22 @@ from .motion import (
     LANE_Y,
     LANE_Z,
     LANES,
+    landing_in_step,
+    rising_lanes,
     rk4_lanes,
 )
-from .place import Pair, Place
+from .place import Pair, Place, Velocity
 
-_ROWS = range(LANE_ROWS, LANE_ROWS + 14)
+_ROWS = range(LANE_ROWS, LANE_ROWS + 20)
 LANE_LEFT, LANE_LAST = _ROWS[:2]
 """Rows of a lane beyond `motion`'s: steps that are left, and the length of the last one [s]."""
 LANE_X_LO, LANE_X_HI, LANE_Y_LO, LANE_Y_HI = _ROWS[2:6]
 """The box [m] about the places that `widen` has seen."""
-START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z, GOAL_T = _ROWS[6:]
+START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z, GOAL_T = _ROWS[6:14]
 """The ends of the flight's leg, where it has one: `keep_ends` writes them, `ends_of` reads them."""
+LANE_TO, LANE_WAY = _ROWS[14:16]
+"""The height [m] at which a flight in a flow that rises ends, and the way there: 1 up, -1 down, 0 for none."""
+_BEFORE_X, _BEFORE_Y, _BEFORE_Z, _BEFORE_T = _ROWS[16:]
 FLIGHT_ROWS = _ROWS.stop
 
 
@@ -73,16 +78,30 @@ def fly_for(lanes, n, duration, dt):
 
 
 @inlined
+def fly_to(flow, lanes, n, height, duration, longest, dt):
+    """Let lane n fly until it reaches a height [m], in steps of `dt` [s], and a shorter last step.
+
+    That takes a `duration` [s] where the flow has no vertical part; below 0 it flies back in time. In a flow that
+    rises the lane ends where its path crosses the height, or after `longest` [s], with NaN as its place.
+    """
+    if rises(flow):
+        fly_for(lanes, n, math.copysign(math.ceil(longest / dt) * dt, duration), dt)
+        lanes[LANE_LAST, n] = lanes[LANE_STEP, n] = math.copysign(dt, duration)
+        lanes[LANE_TO, n] = height
+        lanes[LANE_WAY, n] = 1.0 if height > lanes[LANE_Z, n] else -1.0
+    else:
+        fly_for(lanes, n, duration, dt)
+
+
+@inlined
 def rest(lanes, n):
     """End the flight of lane n."""
     lanes[LANE_LEFT, n], lanes[LANE_STEP, n] = math.inf, 0.0
 
 
-@kernel
-def advance(flow, lanes):
-    """Make one RK4 step of every lane in flight; a lane whose LANE_LEFT is 0 has ended."""
-    rk4_lanes(flow, lanes)
-    flat = lanes.reshape(-1)
+@inlined
+def _count_down(flat):
+    """Count the steps of all lanes; the last one has its own length."""
     for n in range(LANES):
         left = flat[np.uintp(LANE_LEFT * LANES + n)] - 1.0
         flat[np.uintp(LANE_LEFT * LANES + n)] = left
@@ -90,6 +109,46 @@ def advance(flow, lanes):
         flat[np.uintp(LANE_STEP * LANES + n)] = (
             flat[np.uintp(LANE_LAST * LANES + n)] if left == 1.0 else flat[np.uintp(LANE_STEP * LANES + n)]
         )
+
+
+def advance(flow: Flow, lanes: Array) -> None:
+    """Make one RK4 step of every lane in flight; a lane whose LANE_LEFT is 0 has ended."""
+    _ADVANCE[rises(flow)](flow, lanes)
+
+
+def _advance_level(flow, lanes):
+    rk4_lanes(flow, lanes)
+    _count_down(lanes.reshape(-1))
+
+
+def _advance_rising(flow, lanes):
+    for n in range(LANES):
+        lanes[_BEFORE_X, n], lanes[_BEFORE_Y, n] = lanes[LANE_X, n], lanes[LANE_Y, n]
+        lanes[_BEFORE_Z, n], lanes[_BEFORE_T, n] = lanes[LANE_Z, n], lanes[LANE_T, n]
+    rising_lanes(flow, lanes)
+    for n in range(LANES):
+        to, way = lanes[LANE_TO, n], lanes[LANE_WAY, n]
+        if (lanes[LANE_Z, n] - to) * way >= 0.0 and (lanes[_BEFORE_Z, n] - to) * way < 0.0:
+            _land(flow, lanes, n)
+        elif lanes[LANE_LEFT, n] == 1.0 and way != 0.0:
+            lanes[LANE_X, n] = lanes[LANE_Y, n] = math.nan
+    _count_down(lanes.reshape(-1))
+
+
+_ADVANCE = (_advance_level, _advance_rising)
+in_kernels(advance, by_rise(*_ADVANCE))
+
+
+@kernel
+def _land(flow, lanes, n):
+    """End the flight of lane n where its last step crossed its height."""
+    before = Place(lanes[_BEFORE_X, n], lanes[_BEFORE_Y, n], lanes[_BEFORE_Z, n], lanes[_BEFORE_T, n])
+    through = Velocity(lanes[LANE_U, n], lanes[LANE_V, n], lanes[LANE_W, n])
+    height = lanes[LANE_TO, n]
+    x, y, since = landing_in_step(flow, before, lanes[LANE_Z, n], through, lanes[LANE_STEP, n], height)
+    lanes[LANE_X, n], lanes[LANE_Y, n], lanes[LANE_Z, n] = x, y, height
+    lanes[LANE_T, n] = before.t + since
+    lanes[LANE_LEFT, n] = 1.0
 
 
 @kernel

@@ -1,8 +1,8 @@
-"""Flows: the horizontal current (u, v) [m/s] at (x, y, z) [m] and time t [s]; w is zero.
+"""Flows: the current (u, v, w) [m/s] at (x, y, z) [m] and time t [s]; w is upward, and zero in most flows.
 
-A flow is a NamedTuple; `velocity(flow, x, y, z, t)` is the one way to read it. It dispatches on the tuple's
-class, at compile time inside kernels: what each class can do stands in ABILITIES. The last field of every class
-is its `extent`.
+A flow is a NamedTuple; `velocity(flow, x, y, z, t)` reads its horizontal part, `current` all of it. They dispatch
+on the tuple's class, at compile time inside kernels: what each class can do stands in ABILITIES. The last field
+of every class is its `extent`; a class with a vertical part has `max_rise` before it.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cache import entry_point, in_kernels, inlined, kernel
-from .interpolate import pair_between
+from .interpolate import pair_between, row_between
 
 JUST_BELOW = 1.0 - 2.0**-52
 """A factor just below 1: it puts the last point of a grid into the cell before that point."""
@@ -155,7 +155,79 @@ class OceanGrid(NamedTuple):
     extent: Extent
 
 
-Flow = Uniform | Vortices | MovingVortices | Gyre | Rankine | Jet | TidalJet | Grid | OceanGrid
+class Upwelling(NamedTuple):
+    """A current u, v, w [m/s] that stretches: u falls by `stretch` [1/s] along x from `x` on, w grows with z."""
+
+    u: float
+    v: float
+    w: float
+    x: float
+    stretch: float
+    max_rise: float
+    extent: Extent
+
+
+class Rolls(NamedTuple):
+    """Cells that turn about axes along y, side by side along x, and move along x at `drift` [m/s].
+
+    w = -`w` cos(k (x - `x` - drift t)) sin(m z), with `across` k and `down` m [1/m]; u by continuity.
+    """
+
+    x: float
+    w: float
+    across: float
+    down: float
+    drift: float
+    max_rise: float
+    extent: Extent
+
+
+class Abc(NamedTuple):
+    """The flow of Arnold, Beltrami and Childress: `a`, `b`, `c` [m/s], waves of `number` [1/m]."""
+
+    a: float
+    b: float
+    c: float
+    number: float
+    max_rise: float
+    extent: Extent
+
+
+class RisingGrid(NamedTuple):
+    """A `Grid` with a vertical part: values (levels, nx, ny, 4) [m/s], which are u, v, w and nothing."""
+
+    values: Array
+    per_x: float
+    per_y: float
+    z_first: float
+    per_z: float
+    max_rise: float
+    extent: Extent
+
+
+class RisingOceanGrid(NamedTuple):
+    """An `OceanGrid` with a vertical part: values (times, levels, ni, nj, 4) [m/s], u, v, w and nothing.
+
+    `levels` [m] are those of u and v and those of w together: linear between, each part is read as on its own.
+    """
+
+    values: Array
+    levels: Array
+    level_slot: Index
+    slots_per_z: float
+    times: Array
+    time_slot: Index
+    slots_per_t: float
+    index_map: Array
+    per_x: float
+    per_y: float
+    max_rise: float
+    extent: Extent
+
+
+Level = Uniform | Vortices | MovingVortices | Gyre | Rankine | Jet | TidalJet | Grid | OceanGrid
+Rising = Upwelling | Rolls | Abc | RisingGrid | RisingOceanGrid
+Flow = Level | Rising
 
 
 def _uniform(flow, x, y, z, t):
@@ -270,6 +342,55 @@ def _ocean_grid(flow, x, y, z, t):
     return pair_between(values, (n, k, i, j), (d, c, a, b))
 
 
+def _upwelling(flow, x, y, z, t):
+    return flow.u - flow.stretch * (x - flow.x), flow.v, flow.w + flow.stretch * z
+
+
+def _rolls(flow, x, y, z, t):
+    # psi = -(w / k) sin(k x') sin(m z), u = -d psi/dz, w = d psi/dx
+    along = flow.across * (x - flow.x - flow.drift * t)
+    below = flow.down * z
+    u = flow.w * flow.down / flow.across * math.sin(along) * math.cos(below)
+    return u, 0.0, -flow.w * math.cos(along) * math.sin(below)
+
+
+def _abc(flow, x, y, z, t):
+    kx, ky, kz = flow.number * x, flow.number * y, flow.number * z
+    u = flow.a * math.sin(kz) + flow.c * math.cos(ky)
+    v = flow.b * math.sin(kx) + flow.a * math.cos(kz)
+    return u, v, flow.c * math.sin(ky) + flow.b * math.cos(kx)
+
+
+def _rising_grid(flow, x, y, z, t):
+    values = flow.values
+    k, c = _cell((z - flow.z_first) * flow.per_z, values.shape[0])
+    i, a = _cell((x - flow.extent.x_lo) * flow.per_x, values.shape[1])
+    j, b = _cell((y - flow.extent.y_lo) * flow.per_y, values.shape[2])
+    u, v, w, _ = row_between(values, (k, i, j), (c, a, b))
+    return u, v, w
+
+
+def _rising_ocean_grid(flow, x, y, z, t):
+    values = flow.values
+    at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
+    i, a = _cell(at_i, values.shape[2])
+    j, b = _cell(at_j, values.shape[3])
+    k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
+    n, d = _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
+    u, v, w, _ = row_between(values, (n, k, i, j), (d, c, a, b))
+    return u, v, w
+
+
+def _across(flow, x, y, z, t):
+    u, v, _ = current(flow, x, y, z, t)
+    return u, v
+
+
+def _level_current(flow, x, y, z, t):
+    u, v = velocity(flow, x, y, z, t)
+    return u, v, 0.0
+
+
 def _in_box(flow, x, y, t):
     known = flow.extent
     return known.x_lo <= x <= known.x_hi and known.y_lo <= y <= known.y_hi and known.t_lo <= t <= known.t_hi
@@ -305,6 +426,22 @@ def _grid_carry(flow, z):
     return flow.level_carry[k] + (c * (low + 0.5 * c * (high - low)) + beyond * speed) / flow.per_z
 
 
+def _yes(flow):
+    return True
+
+
+def _no(flow):
+    return False
+
+
+def _no_rise(flow):
+    return 0.0
+
+
+def _max_rise(flow):
+    return flow.max_rise
+
+
 def _no_cycle(flow):
     return 0.0
 
@@ -321,6 +458,10 @@ def _tidal_cycle(flow):
     return flow.period
 
 
+def _rolls_cycle(flow):
+    return abs(2.0 * math.pi / (flow.across * flow.drift)) if flow.drift != 0.0 else 0.0
+
+
 def _ocean_cycle(flow):
     # a file of one time has no first and last time
     return 0.0 if math.isinf(flow.extent.t_lo) else math.inf
@@ -334,6 +475,13 @@ class Abilities(NamedTuple):
     contains_box: Callable[..., Any] = _box_in_box
     carry: Callable[..., Any] = _steady_carry
     cycle: Callable[..., float] = _no_cycle
+    current: Callable[..., Any] = _level_current
+    rises: Callable[..., Any] = _no
+    max_rise: Callable[..., Any] = _no_rise
+
+
+def _rising(current: Callable[..., Any], **others: Callable[..., Any]) -> Abilities:
+    return Abilities(_across, current=current, rises=_yes, max_rise=_max_rise, **others)
 
 
 ABILITIES: dict[type, Abilities] = {
@@ -346,12 +494,34 @@ ABILITIES: dict[type, Abilities] = {
     TidalJet: Abilities(_tidal_jet, cycle=_tidal_cycle),
     Grid: Abilities(_grid, carry=_grid_carry),
     OceanGrid: Abilities(_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle),
+    Upwelling: _rising(_upwelling),
+    Rolls: _rising(_rolls, cycle=_rolls_cycle),
+    Abc: _rising(_abc),
+    RisingGrid: _rising(_rising_grid),
+    RisingOceanGrid: _rising(
+        _rising_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle
+    ),
 }
 
 
 def velocity(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float]:
     """Return the current (u, v) [m/s] along x and y of the local frame, at (x, y, z) [m] and t [s]."""
     return ABILITIES[type(flow)].velocity(flow, x, y, z, t)
+
+
+def current(flow: Flow, x: float, y: float, z: float, t: float) -> tuple[float, float, float]:
+    """Return the current (u, v, w) [m/s] at (x, y, z) [m] and t [s]; w is upward."""
+    return ABILITIES[type(flow)].current(flow, x, y, z, t)
+
+
+def rises(flow: Flow) -> bool:
+    """Return whether the flow's class has a vertical part; kernels know it when they are compiled."""
+    return ABILITIES[type(flow)].rises(flow)
+
+
+def max_rise(flow: Flow) -> float:
+    """Return an upper bound of the vertical part |w| [m/s]: 0 in a flow without one."""
+    return ABILITIES[type(flow)].max_rise(flow)
 
 
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
@@ -375,8 +545,16 @@ def carry(flow: Flow, z: float) -> float:
     return ABILITIES[type(flow)].carry(flow, z)
 
 
-for _ability in (velocity, contains, contains_box, carry):
+for _ability in (velocity, current, rises, max_rise, contains, contains_box, carry):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
+
+
+def by_rise(level: Callable[..., Any], rising: Callable[..., Any]) -> dict[type, Callable[..., Any]]:
+    """Return a table for `in_kernels`: one function for flows without a vertical part, one for the others.
+
+    Only the one that a flow needs is compiled.
+    """
+    return {kind: rising if can.rises is _yes else level for kind, can in ABILITIES.items()}
 
 
 def cycle(flow: Flow) -> float:
@@ -418,3 +596,22 @@ def velocities(flow, x, y, z, t):
     for n in range(x.size):
         uv[n] = velocity(flow, x[n], y[n], z[n], t[n])
     return uv
+
+
+@entry_point()
+def currents(flow, x, y, z, t):
+    """Return `current` at many points for Python code: x, y, z, t have shape (n,), the result (n, 3) [m/s]."""
+    uvw = np.empty((x.size, 3))
+    for n in range(x.size):
+        uvw[n] = current(flow, x[n], y[n], z[n], t[n])
+    return uvw
+
+
+@entry_point(nogil=True)
+def sample_rising_lines(flow, x, y, z, t, uvw, first, last):
+    """Write `current` at time t on the mesh of x, y, z into uvw (z, x, y, 4), as `sample_lines` does."""
+    for n in range(first, last):
+        k, i = n // x.size, n % x.size
+        for j in range(y.size):
+            u, v, w = current(flow, x[i], y[j], z[k], t)
+            uvw[k, i, j] = u, v, w, 0.0

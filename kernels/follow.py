@@ -26,7 +26,7 @@ from .flight import (
     rest,
     widen,
 )
-from .flow import velocity
+from .flow import current, rises
 from .motion import LANE_X, LANE_Y, LANES
 from .patch import longer
 from .place import Pair, Place
@@ -50,6 +50,7 @@ from .steer import (
     MAX_TURN,
     OPEN,
     broyden,
+    note_time,
     take_off,
 )
 
@@ -119,7 +120,7 @@ def _send(medium, position, source, departure, since, guess, lanes, n):
     lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n] = guess[LEG_COARSE_X], guess[LEG_COARSE_Y]
     lanes[AIM_STATE, n], lanes[_COUNT, n] = OPEN, 0.0
     lanes[_MODE, n] = _COARSE if guess[LEG_KNOWN] else _BASE
-    take_off(medium.polar, lanes, n, COARSE_STEP * medium.integration.dt)
+    take_off(medium, lanes, n, COARSE_STEP * medium.integration.dt)
 
 
 @kernel
@@ -143,12 +144,12 @@ def _turned(polar, lanes, n, off_x, off_y):
 
 
 @kernel
-def _measure(polar, lanes, n, off_x, off_y, since, dt):
+def _measure(medium, lanes, n, off_x, off_y, since):
     """Lane n has flown for its flow map's derivatives, and for its shift: on to the next flight."""
     mode = lanes[_MODE, n]
     if mode == _BASE:
         lanes[_BASE_X, n], lanes[_BASE_Y, n] = off_x, off_y
-        steepest = polar.steepest[int(lanes[AIM_DIRECTION, n])]
+        steepest = medium.polar.steepest[int(lanes[AIM_DIRECTION, n])]
         lanes[_TILT_A, n] = TILT if lanes[AIM_ANGLE, n] + TILT <= steepest else -TILT
         lanes[AIM_ANGLE, n] += lanes[_TILT_A, n]
         lanes[_MODE, n] = _TILTED_A
@@ -170,7 +171,7 @@ def _measure(polar, lanes, n, off_x, off_y, since, dt):
         t = start.t + since
         keep_ends(lanes, n, Pair(Place(start.x, start.y, start.z, t), Place(goal.x, goal.y, goal.z, t)))
         lanes[_MODE, n] = _COARSE
-    take_off(polar, lanes, n, COARSE_STEP * dt)
+    take_off(medium, lanes, n, COARSE_STEP * medium.integration.dt)
 
 
 @kernel
@@ -183,14 +184,15 @@ def _meet(integration, lanes, n, miss):
 
 
 @kernel
-def _landed(polar, integration, since, lanes, n):
+def _landed(medium, since, lanes, n):
     """Decide on lane n after its landing: HIT on its target, LOST far from it; else turn it and fly again."""
-    dt = integration.dt
+    polar, integration, dt = medium.polar, medium.integration, medium.integration.dt
+    note_time(medium.flow, lanes, n)
     _, goal = ends_of(lanes, n)
     off_x, off_y = lanes[LANE_X, n] - goal.x, lanes[LANE_Y, n] - goal.y
     lanes[AIM_STATE, n] = OPEN
     if lanes[_MODE, n] < _COARSE:
-        _measure(polar, lanes, n, off_x, off_y, since, dt)
+        _measure(medium, lanes, n, off_x, off_y, since)
         return
     fine = lanes[_MODE, n] == _FINE
     if not fine:
@@ -198,6 +200,8 @@ def _landed(polar, integration, since, lanes, n):
     miss = math.hypot(off_x, off_y)
     shift = math.hypot(lanes[_SHIFT_X, n], lanes[_SHIFT_Y, n])
     coarse_is_enough = not fine and shift <= COARSE_TOLERANCE and integration.tolerance > 2.0 * COARSE_TOLERANCE
+    if rises(medium.flow):  # a coarse flight does not know its time well enough
+        coarse_is_enough = False
     count = lanes[_COUNT, n]
     first_fine = fine and count == 0.0
     if first_fine:
@@ -231,7 +235,7 @@ def _landed(polar, integration, since, lanes, n):
     if not fine and miss <= NEAR and not coarse_is_enough:
         lanes[_MODE, n], lanes[_COUNT, n] = _FINE, 0.0
         fine = True
-    take_off(polar, lanes, n, dt if fine else COARSE_STEP * dt)
+    take_off(medium, lanes, n, dt if fine else COARSE_STEP * dt)
 
 
 @making
@@ -253,7 +257,7 @@ def _fly(medium, position, source, departure, since, guesses, count, legs, lanes
         for n in range(LANES):
             if lanes[LANE_LEFT, n] > 0.0:
                 continue
-            _landed(medium.polar, medium.integration, since, lanes, n)
+            _landed(medium, since, lanes, n)
             if lanes[AIM_STATE, n] == OPEN and lanes[AIM_TIME, n] <= LATEST * horizon:
                 continue
             if lanes[AIM_STATE, n] == HIT and lanes[AIM_TIME, n] <= horizon:
@@ -290,18 +294,21 @@ def _take(medium, lanes, n, leg):
 
 
 @kernel
-def _neighbours_guess(polar, position, z_p, leg, over_x, over_y, r, guess):
+def _neighbours_guess(medium, position, z_p, leg, over, r, guess):
     """A first guess for the target r out of a leg to another, into `guess`; its time [s], inf where it is none.
 
     The leg, which began at the height z_p [m], is flown on, or less far, to r's depth at its last velocity over
-    ground [m/s], and turned by what it then misses.
+    ground, `over` [m/s], and turned by what it then misses.
     """
+    polar = medium.polar
     direction = CLIMB if leg[LEG_ANGLE] > 0.0 else DIVE
     x, y, z = position[int(leg[LEG_NODE])]
     x_r, y_r, z_r = position[r]
     angle, heading = abs(leg[LEG_ANGLE]), leg[LEG_HEADING]
     since = (2.0 * direction - 1.0) * (z_r - z) / vertical_speed(polar, direction, angle)
-    off_x, off_y = x + since * over_x - x_r, y + since * over_y - y_r
+    if rises(medium.flow):
+        since = (z_r - z) / over[2]
+    off_x, off_y = x + since * over[0] - x_r, y + since * over[1] - y_r
     turn_a = -(leg[LEG_INVERSE] * off_x + leg[LEG_INVERSE + 1] * off_y)
     turn_h = -(leg[LEG_INVERSE + 2] * off_x + leg[LEG_INVERSE + 3] * off_y)
     turn = max(abs(turn_a), abs(turn_h))
@@ -314,7 +321,18 @@ def _neighbours_guess(polar, position, z_p, leg, over_x, over_y, r, guess):
         guess[m] = leg[m]
     guess[LEG_NODE], guess[GUESS_TURN] = r, turn
     guess[LEG_ANGLE], guess[LEG_HEADING] = (angle if direction == CLIMB else -angle), heading + turn_h
+    if rises(medium.flow):
+        return _time_of(medium, position, z_p, leg) + since
     return abs(z_r - z_p) / vertical_speed(polar, direction, angle)
+
+
+@kernel
+def _time_of(medium, position, z_p, leg):
+    """Return how long a leg takes [s]; of a blocked one in a flow that rises, about how long."""
+    if rises(medium.flow) and not math.isnan(leg[LEG_TIME]):
+        return leg[LEG_TIME]
+    direction, z = CLIMB if leg[LEG_ANGLE] > 0.0 else DIVE, position[int(leg[LEG_NODE]), 2]
+    return abs(z - z_p) / vertical_speed(medium.polar, direction, abs(leg[LEG_ANGLE]))
 
 
 @kernel
@@ -323,11 +341,10 @@ def _over_ground(medium, position, z_p, departure, leg):
     direction = CLIMB if leg[LEG_ANGLE] > 0.0 else DIVE
     x, y, z = position[int(leg[LEG_NODE])]
     angle = abs(leg[LEG_ANGLE])
-    u, v = velocity(
-        medium.flow, x, y, z, departure + abs(z - z_p) / vertical_speed(medium.polar, direction, angle)
-    )
+    u, v, w = current(medium.flow, x, y, z, departure + _time_of(medium, position, z_p, leg))
     along = horizontal_speed(medium.polar, direction, angle)
-    return u + along * math.cos(leg[LEG_HEADING]), v + along * math.sin(leg[LEG_HEADING])
+    w += (2.0 * direction - 1.0) * vertical_speed(medium.polar, direction, angle)
+    return u + along * math.cos(leg[LEG_HEADING]), v + along * math.sin(leg[LEG_HEADING]), w
 
 
 @making
@@ -363,7 +380,7 @@ def _neighbours_guesses(
         if not new or legs[k, LEG_TIME] > HELD * cut[n, direction]:
             continue
         z_p = position[source[n], 2]
-        over_x, over_y = _over_ground(medium, position, z_p, departure, legs[k])
+        over = _over_ground(medium, position, z_p, departure, legs[k])
         for m in range(near.shape[1]):
             r = near[int(legs[k, LEG_NODE]), m]
             slot = where[n, r]
@@ -373,7 +390,7 @@ def _neighbours_guesses(
                 continue
             guesses = longer(guesses, asked + 1)
             guess = guesses[asked]
-            time = _neighbours_guess(medium.polar, position, z_p, legs[k], over_x, over_y, r, guess)
+            time = _neighbours_guess(medium, position, z_p, legs[k], over, r, guess)
             if not time <= SPREADS * cut[n, direction]:
                 continue
             if slot < 0:

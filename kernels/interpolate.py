@@ -46,6 +46,14 @@ def _lerp(builder, low, high, weight):
     return builder.call(fma, [_shuffled(builder, one, [0] * kind.count), builder.fsub(high, low), low])
 
 
+def _four_at(context, builder, array, shape, strides, layout, index):
+    """Return the four numbers from an index on."""
+    place = cgutils.get_item_pointer2(context, builder, array.data, shape, strides, layout, index)
+    row = builder.load(builder.bitcast(place, _FOUR.as_pointer()), typ=_FOUR)
+    row.align = 8
+    return row
+
+
 def _in_registers(typing_context, values, cell, weight):
     def generate(context, builder, signature, arguments):
         layout, axes = signature.args[0].layout, signature.args[0].ndim - 1
@@ -57,10 +65,7 @@ def _in_registers(typing_context, values, cell, weight):
         rows = []
         for corner in itertools.product((below, above), repeat=axes - 1):
             index = [ends[n] for n, ends in enumerate(corner)] + [below[-1], nothing]
-            place = cgutils.get_item_pointer2(context, builder, array.data, shape, strides, layout, index)
-            row = builder.load(builder.bitcast(place, _FOUR.as_pointer()), typ=_FOUR)
-            row.align = 8
-            rows.append(row)
+            rows.append(_four_at(context, builder, array, shape, strides, layout, index))
         for n in range(axes - 1):
             half = len(rows) // 2
             rows = [_lerp(builder, rows[m], rows[m + half], weights[n]) for m in range(half)]
@@ -81,3 +86,43 @@ def _pair_between_in_kernels(values, cell, weight):
     if not (plain and values.ndim - 1 == len(cell) == len(weight)):
         return None
     return lambda values, cell, weight: _pair_between(values, cell, weight)
+
+
+def row_between(values: Any, cell: Any, weight: Any) -> tuple[float, float, float, float]:
+    """The row of four at a fractional index: values (n_1, ..., n_d, 4), cell and weight as in `pair_between`."""
+    block = values[tuple(slice(int(c), int(c) + 2) for c in cell)]
+    for w in weight:
+        block = block[0] + w * (block[1] - block[0])
+    return block[0], block[1], block[2], block[3]
+
+
+def _rows_in_registers(typing_context, values, cell, weight):
+    def generate(context, builder, signature, arguments):
+        layout, axes = signature.args[0].layout, signature.args[0].ndim - 1
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        shape, strides = (cgutils.unpack_tuple(builder, part) for part in (array.shape, array.strides))
+        below, weights = (cgutils.unpack_tuple(builder, part) for part in arguments[1:])
+        nothing = ir.Constant(below[0].type, 0)
+        above = [builder.add(index, ir.Constant(index.type, 1)) for index in below]
+        rows = []
+        for corner in itertools.product((below, above), repeat=axes):
+            index = [ends[n] for n, ends in enumerate(corner)] + [nothing]
+            rows.append(_four_at(context, builder, array, shape, strides, layout, index))
+        for n in range(axes):
+            half = len(rows) // 2
+            rows = [_lerp(builder, rows[m], rows[m + half], weights[n]) for m in range(half)]
+        parts = [builder.extract_element(rows[0], ir.Constant(_INT, n)) for n in range(4)]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(types.float64, 4)(values, cell, weight), generate
+
+
+_row_between: Any = intrinsic(_rows_in_registers)
+
+
+@overload(row_between, inline="always", jit_options=BARE)
+def _row_between_in_kernels(values, cell, weight):
+    plain = values.dtype == types.float64 and values.layout == "C"
+    if not (plain and values.ndim - 1 == len(cell) == len(weight)):
+        return None
+    return lambda values, cell, weight: _row_between(values, cell, weight)

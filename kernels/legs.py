@@ -2,8 +2,8 @@
 
 from .cache import entry_point, inlined, kernel
 from .edges import CLEARANCE_SPACING
-from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_for, hangar, place, rest
-from .motion import LANE_X, LANE_Y, LANES, is_clear, stays_inside
+from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_to, hangar, place, rest
+from .motion import LANE_T, LANE_X, LANE_Y, LANES, is_clear, stays_inside
 from .place import Place, Velocity
 
 _LEG = FLIGHT_ROWS
@@ -19,26 +19,28 @@ def _leg_of(start, through, leg):
 
 
 @kernel
-def _take_off(start, through, duration, dt, leg, lanes, n):
+def _take_off(flow, start, through, duration, height, longest, dt, leg, lanes, n):
     """Start lane n on a leg."""
     at, velocity = _leg_of(start, through, leg)
     place(lanes, n, at, velocity)
-    fly_for(lanes, n, duration[leg], dt)
+    fly_to(flow, lanes, n, height[leg], duration[leg], longest, dt)
     lanes[_LEG, n] = leg
 
 
 @entry_point(nogil=True)
-def fly_legs(flow, start, through, duration, dt, end, first, last):
-    """Where legs first..last - 1 end: x, y [m] into `end` (n, 2).
+def fly_legs(flow, start, through, duration, height, longest, dt, end, first, last):
+    """Where and when legs first..last - 1 end: x, y [m] and the time since their departure [s] into `end` (n, 3).
 
     `start` (n, 4): x, y, z [m] and departure [s]; `through` (n, 3): velocity through water [m/s]; `duration`
-    (n,) [s], above 0. Steps as `motion.trace` takes them; a leg's end does not depend on its company.
+    (n,) [s], above 0. In a flow that rises a leg ends where it reaches its `height` (n,) [m], within
+    `longest` [s], and not after its duration. Steps as `motion.trace` takes them; a leg's end does not depend on
+    its company.
     """
     lanes = hangar(FLIGHT_ROWS + 1)
     waiting, flying = first, 0
     for n in range(LANES):
         if waiting < last:
-            _take_off(start, through, duration, dt, waiting, lanes, n)
+            _take_off(flow, start, through, duration, height, longest, dt, waiting, lanes, n)
             waiting, flying = waiting + 1, flying + 1
     while flying > 0:
         advance(flow, lanes)
@@ -47,8 +49,9 @@ def fly_legs(flow, start, through, duration, dt, end, first, last):
                 continue
             leg = int(lanes[_LEG, n])
             end[leg, 0], end[leg, 1] = lanes[LANE_X, n], lanes[LANE_Y, n]
+            end[leg, 2] = lanes[LANE_T, n] - start[leg, 3]
             if waiting < last:
-                _take_off(start, through, duration, dt, waiting, lanes, n)
+                _take_off(flow, start, through, duration, height, longest, dt, waiting, lanes, n)
                 waiting += 1
             else:
                 rest(lanes, n)

@@ -1,14 +1,19 @@
 """Motion: a constant velocity through water, carried by the flow; RK4, closest approach, the trace."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .cache import entry_point, inlined, kernel, making
-from .flow import carry, contains, velocity
+from .cache import entry_point, in_kernels, inlined, kernel, making
+from .flow import Flow, by_rise, carry, contains, current, rises, velocity
 from .place import Place
 from .terrain import allowed, open_between
+
+CROSSED = 1e-7
+"""A path has reached a height at this distance [m] from it."""
+EMERGED = 1e-3
+"""A path has left the water this far [m] above the surface."""
 
 
 class Integration(NamedTuple):
@@ -23,8 +28,8 @@ class Integration(NamedTuple):
 def rk4_step(flow, at, through, dt):
     """One RK4 step of dx/dt = flow + (u, v, w), the velocity through water [m/s]; returns x, y [m].
 
-    From a place `at`; `through` is a Control, or what has its u, v, w. Depth is linear in time, since the flow
-    has no vertical part.
+    From a place `at`; `through` is a Control, or what has its u, v, w. Only for a flow without a vertical part,
+    in which depth is linear in time; `step_on` is for any flow.
     """
     x, y, z, t = at.x, at.y, at.z, at.t
     u, v, w = through.u, through.v, through.w
@@ -36,6 +41,67 @@ def rk4_step(flow, at, through, dt):
     x_next = x + dt * (u + (u1 + 2.0 * (u2 + u3) + u4) / 6.0)
     y_next = y + dt * (v + (v1 + 2.0 * (v2 + v3) + v4) / 6.0)
     return x_next, y_next
+
+
+@kernel
+def rk4_rising(flow, at, through, dt):
+    """The same for a flow with a vertical part; returns x, y, z [m]."""
+    x, y, z, t = at.x, at.y, at.z, at.t
+    u, v, w = through.u, through.v, through.w
+    half = 0.5 * dt
+    u1, v1, w1 = current(flow, x, y, z, t)
+    u2, v2, w2 = current(flow, x + half * (u1 + u), y + half * (v1 + v), z + half * (w1 + w), t + half)
+    u3, v3, w3 = current(flow, x + half * (u2 + u), y + half * (v2 + v), z + half * (w2 + w), t + half)
+    u4, v4, w4 = current(flow, x + dt * (u3 + u), y + dt * (v3 + v), z + dt * (w3 + w), t + dt)
+    x_next = x + dt * (u + (u1 + 2.0 * (u2 + u3) + u4) / 6.0)
+    y_next = y + dt * (v + (v1 + 2.0 * (v2 + v3) + v4) / 6.0)
+    return x_next, y_next, z + dt * (w + (w1 + 2.0 * (w2 + w3) + w4) / 6.0)
+
+
+def _step_level(flow, at, through, dt):
+    x, y = rk4_step(flow, at, through, dt)
+    return x, y, at.z + dt * through.w
+
+
+def step_on(flow: Flow, at: Place, through: Any, dt: float) -> tuple[float, float, float]:
+    """One RK4 step in any flow, from a Place, with a velocity through water; returns x, y, z [m]."""
+    x, y, z = _STEP[rises(flow)](flow, at, through, dt)
+    return x, y, z
+
+
+def _step_rising(flow, at, through, dt):
+    return rk4_rising(flow, at, through, dt)
+
+
+_STEP = (_step_level, _step_rising)
+in_kernels(step_on, by_rise(*_STEP))
+
+
+@kernel
+def landing_in_step(flow, before, after_z, through, step, height):
+    """Where and when [s after `before`] a path crosses a height [m] within one step: x, y, time.
+
+    The step is shortened until its end is CROSSED [m] from the height at the most: by Newton's method, and by
+    halving where that leaves the step.
+    """
+    side = 1.0 if after_z >= before.z else -1.0
+    low, high = 0.0, step
+    share = step * (height - before.z) / (after_z - before.z)
+    x, y = before.x, before.y
+    for _ in range(60):
+        x, y, z = rk4_rising(flow, before, through, share)
+        off = height - z
+        if abs(off) <= CROSSED:
+            break
+        if off * side > 0.0:
+            low = share
+        else:
+            high = share
+        _, _, rise = current(flow, x, y, z, before.t + share)
+        closer = share + off / (rise + through.w)
+        inside = (closer - low) * (closer - high) < 0.0
+        share = closer if inside else 0.5 * (low + high)
+    return x, y, share
 
 
 @inlined
@@ -59,15 +125,18 @@ def arrival_window(w, rise, tolerance):
     return max(0.0, (abs(rise) - tolerance) / abs(w)), (abs(rise) + tolerance) / abs(w)
 
 
-@kernel
 def closest_approach(flow, pair, through, integration):
     """Miss [m] and time since departure [s] of the path's closest approach to its goal, along its segments.
 
     Equal to the literal loop over all steps wherever that loop hits: outside the arrival window the
     depth alone is further away than the tolerance. A path that leaves the flow ends; so does
     one that the flow, at its fastest, could no longer carry to the goal in time. inf is the miss of a path that
-    never came into the window.
+    never came into the window. In a flow with a vertical part the literal loop itself.
     """
+    return _CLOSEST[rises(flow)](flow, pair, through, integration)
+
+
+def _closest_level(flow, pair, through, integration):
     start, goal = pair
     dt, u, v, w = integration.dt, through.u, through.v, through.w
     first, last = arrival_window(w, goal.z - start.z, integration.tolerance)
@@ -99,17 +168,41 @@ def closest_approach(flow, pair, through, integration):
     return miss, duration
 
 
+def _closest_rising(flow, pair, through, integration):
+    here, goal = pair
+    way = 1.0 if goal.z > here.z else -1.0
+    miss, duration = math.inf, math.inf
+    for n in range(integration.steps):
+        # past its depth a leg has ended
+        passed = (here.z - goal.z) * way > integration.tolerance
+        if passed or not contains(flow, here.x, here.y, here.t):
+            break
+        x, y, z = rk4_rising(flow, here, through, integration.dt)
+        there = Place(x, y, z, pair.start.t + (n + 1) * integration.dt)
+        share, distance = along_segment(here, there, goal)
+        if distance < miss:
+            miss, duration = distance, (n + share) * integration.dt
+        here = there
+    return miss, duration
+
+
+_CLOSEST = (_closest_level, _closest_rising)
+in_kernels(closest_approach, by_rise(*_CLOSEST))
+
+
 @making
 def trace(flow, start, through, duration, dt):
     """The path as rows [t, x, y, z]: every full step of `dt`, and the last, shorter one to `duration`."""
     full = int(duration / dt)
     rows = np.empty((full + 2 if full * dt < duration else full + 1, 4))
-    x, y = start.x, start.y
+    x, y, z = start.x, start.y, start.z
     for n in range(rows.shape[0]):
         since = min(n * dt, duration)
-        here = Place(x, y, start.z + since * through.w, start.t + since)
-        rows[n] = (here.t, x, y, here.z)
-        x, y = rk4_step(flow, here, through, min(dt, duration - since))
+        if not rises(flow):
+            z = start.z + since * through.w
+        here = Place(x, y, z, start.t + since)
+        rows[n] = (here.t, x, y, z)
+        x, y, z = step_on(flow, here, through, min(dt, duration - since))
     return rows
 
 
@@ -132,8 +225,11 @@ def stays_inside(flow, start, through, duration, dt):
 
 @making
 def is_clear(flow, terrain, start, through, duration, dt, spacing):
-    """Return whether the whole leg stays where `terrain` allows a glider; it is checked every `spacing` [m]."""
-    if open_between(terrain, start.z, start.z + through.w * duration):
+    """Return whether the whole leg stays where `terrain` allows a glider; it is checked every `spacing` [m].
+
+    Where the flow rises, a leg may also not leave the water: the flow may lift a glider at first.
+    """
+    if not rises(flow) and open_between(terrain, start.z, start.z + through.w * duration):
         return True
     rows = trace(flow, start, through, duration, dt)
     for n in range(rows.shape[0] - 1):
@@ -142,6 +238,8 @@ def is_clear(flow, terrain, start, through, duration, dt, spacing):
         looks = math.ceil(math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2) / spacing)
         for look in range(looks + 1):
             s = look / max(looks, 1)
+            if rises(flow) and az + s * (bz - az) > EMERGED:
+                return False
             if not allowed(terrain, ax + s * (bx - ax), ay + s * (by - ay), az + s * (bz - az)):
                 return False
     return True
@@ -152,7 +250,8 @@ LANES = 32
 LANE_X, LANE_Y, LANE_Z, LANE_T, LANE_U, LANE_V, LANE_W, LANE_STEP = range(8)
 """Rows of lanes (LANE_ROWS or more, LANES): place [m], time [s], velocity through water [m/s], step [s]."""
 _U1, _V1, _U2, _V2, _U3, _V3, _XS, _YS = range(8, 16)
-LANE_ROWS = 16
+_W1, _W2, _W3, _ZS = range(16, 20)
+LANE_ROWS = 20
 """The rows above and the stages' own; a caller's lanes may have more."""
 
 
@@ -218,4 +317,53 @@ def rk4_lanes(flow, lanes):
         flat[np.uintp(LANE_Z * LANES + n)] += (
             flat[np.uintp(LANE_STEP * LANES + n)] * flat[np.uintp(LANE_W * LANES + n)]
         )
+        flat[np.uintp(LANE_T * LANES + n)] += flat[np.uintp(LANE_STEP * LANES + n)]
+
+
+@kernel
+def _rising_slopes(flow, flat, x, y, z, share, u, v, w):
+    """As `_slopes`, with the vertical part, at places of their own height."""
+    for n in range(LANES):
+        along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+        (
+            flat[np.uintp(u * LANES + n)],
+            flat[np.uintp(v * LANES + n)],
+            flat[np.uintp(w * LANES + n)],
+        ) = current(
+            flow,
+            flat[np.uintp(x * LANES + n)],
+            flat[np.uintp(y * LANES + n)],
+            flat[np.uintp(z * LANES + n)],
+            flat[np.uintp(LANE_T * LANES + n)] + along,
+        )
+
+
+@kernel
+def _move_along(flat, share, place, through, slope, stage):
+    """One coordinate of the stage points: a `share` of the step from `place` along slope and velocity."""
+    for n in range(LANES):
+        along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+        flat[np.uintp(stage * LANES + n)] = flat[np.uintp(place * LANES + n)] + along * (
+            flat[np.uintp(slope * LANES + n)] + flat[np.uintp(through * LANES + n)]
+        )
+
+
+@kernel
+def rising_lanes(flow, lanes):
+    """`rk4_lanes` for a flow with a vertical part: the same bits as `rk4_rising`."""
+    flat = lanes.reshape(-1)
+    _rising_slopes(flow, flat, LANE_X, LANE_Y, LANE_Z, 0.0, _U1, _V1, _W1)
+    _move(flat, 0.5, _U1, _V1)
+    _move_along(flat, 0.5, LANE_Z, LANE_W, _W1, _ZS)
+    _rising_slopes(flow, flat, _XS, _YS, _ZS, 0.5, _U2, _V2, _W2)
+    _move(flat, 0.5, _U2, _V2)
+    _move_along(flat, 0.5, LANE_Z, LANE_W, _W2, _ZS)
+    _rising_slopes(flow, flat, _XS, _YS, _ZS, 0.5, _U3, _V3, _W3)
+    _move(flat, 1.0, _U3, _V3)
+    _move_along(flat, 1.0, LANE_Z, LANE_W, _W3, _ZS)
+    _rising_slopes(flow, flat, _XS, _YS, _ZS, 1.0, _XS, _YS, _ZS)
+    _sum(flat, LANE_X, LANE_U, _U1, _U2, _U3, _XS)
+    _sum(flat, LANE_Y, LANE_V, _V1, _V2, _V3, _YS)
+    _sum(flat, LANE_Z, LANE_W, _W1, _W2, _W3, _ZS)
+    for n in range(LANES):
         flat[np.uintp(LANE_T * LANES + n)] += flat[np.uintp(LANE_STEP * LANES + n)]

@@ -12,13 +12,20 @@ from .flow import Array, Numbers
 GUESS_TASK, GUESS_NODE, GUESS_ANGLE, GUESS_HEADING, GUESS_OUTSIDE, GUESS_INVERSE = range(6)
 """Columns of a guess: the task it is for, node, glide angle and heading [rad], how far outside its cell, in the
 cell's own units, and from GUESS_INVERSE on d(angle, heading) / d(x, y), row by row."""
-GUESS_COLUMNS = 10
+GUESS_TIME = 10
+"""How long its leg takes [s], by the flow map: where the flow has no vertical part, the angle says it better."""
+GUESS_COLUMNS = 11
+LANDING_COLUMNS = 3
+"""Of each vertex and level: x, y [m], and the time since the launch [s], NaN where the level is not reached."""
 ALONG_ANGLE, ALONG_HEADING = 4, 5
-"""Rows of a patch, after the landings of its four corners: its second derivatives, in the cell's own units."""
+"""Rows of a patch, after the landings of its four corners: its second derivatives, in the cell's own units, 0
+where a landing beyond the patch is missing."""
 BENT = 8.0
 """A cell whose middle lies this far [m] from its linear image is halved."""
 MARGIN = 0.35
 """A target this far outside a triangle, in its own units, is a guess where none is inside."""
+BESIDE_LANDED = 50.0
+"""A cell of which some corners do not land is halved where a wanted node is this near [m] to those that do."""
 MAX_LEVELS = 32
 """A fan lands on at most this many depths, because the levels of a cell are bits of a number."""
 
@@ -145,8 +152,11 @@ def fill_patch(landing, corners, i, j, level, patch):
 
     `corners` (9,): the vertices of the cell, halved. Of second derivatives the mean of both sides.
     """
+    first = LANDING_COLUMNS * level
+    for c in range(4):
+        patch[c, 2] = landing[corners[3 * (i + c // 2) + j + c % 2], first + 2]
     for m in range(2):
-        at = 2 * level + m
+        at = first + m
         for c in range(4):
             patch[c, m] = landing[corners[3 * (i + c // 2) + j + c % 2], at]
         along_angle = 0.0
@@ -157,8 +167,17 @@ def fill_patch(landing, corners, i, j, level, patch):
             along_angle += ends - 2.0 * landing[corners[a + 3], at]
             ends = landing[corners[h], at] + landing[corners[h + 2], at]
             along_heading += ends - 2.0 * landing[corners[h + 1], at]
-        patch[ALONG_ANGLE, m] = 0.5 * along_angle
-        patch[ALONG_HEADING, m] = 0.5 * along_heading
+        patch[ALONG_ANGLE, m] = 0.5 * along_angle if along_angle == along_angle else 0.0
+        patch[ALONG_HEADING, m] = 0.5 * along_heading if along_heading == along_heading else 0.0
+
+
+@kernel
+def landed_corners(patch):
+    """Return how many of a patch's four corners have landed."""
+    count = 0
+    for c in range(4):
+        count += not math.isnan(patch[c, 2])
+    return count
 
 
 @kernel
@@ -200,6 +219,20 @@ def wants_halving(nodes, layer, patches):
     box = _around(nodes.bins, patches)
     room = max(bend, 0.25 * max(box.x_hi - box.x_lo, box.y_hi - box.y_lo)) if folded else bend
     return any_wanted(nodes, layer, wider(box, room))
+
+
+@kernel
+def any_wanted_around(nodes, layer, patches):
+    """Return whether a wanted node lies near those corners of a patch that have landed."""
+    p = patches[0]
+    box = Box(math.inf, -math.inf, math.inf, -math.inf)
+    for c in range(4):
+        if not math.isnan(p[c, 2]):
+            box = Box(
+                min(box.x_lo, p[c, 0]), max(box.x_hi, p[c, 0]), min(box.y_lo, p[c, 1]), max(box.y_hi, p[c, 1])
+            )
+    size = max(box.x_hi - box.x_lo, box.y_hi - box.y_lo)
+    return any_wanted(nodes, layer, wider(box, max(size, BESIDE_LANDED)))
 
 
 @kernel
@@ -258,6 +291,8 @@ def _guess(p, x, y, cell, rows, at):
         return False
     guess = rows[at]
     guess[GUESS_OUTSIDE] = outside
+    steeper, shallower = p[2, 2] + r * (p[3, 2] - p[2, 2]), p[0, 2] + r * (p[1, 2] - p[0, 2])
+    guess[GUESS_TIME] = shallower + s * (steeper - shallower)
     guess[GUESS_ANGLE], guess[GUESS_HEADING] = cell.angle + s * cell.da, cell.heading + r * cell.dh
     guess[GUESS_INVERSE], guess[GUESS_INVERSE + 1] = cell.da * y_r / det, -cell.da * x_r / det
     guess[GUESS_INVERSE + 2], guess[GUESS_INVERSE + 3] = -cell.dh * y_s / det, cell.dh * x_s / det
@@ -267,6 +302,8 @@ def _guess(p, x, y, cell, rows, at):
 @kernel
 def _blend(patches, share):
     """The third patch, `share` of the way from the second, at a slab's start, to the first, at its end."""
+    for c in range(4):
+        patches[2, c, 2] = patches[1, c, 2] + share * (patches[0, c, 2] - patches[1, c, 2])
     for c in range(6):
         for m in range(2):
             patches[2, c, m] = patches[1, c, m] + share * (patches[0, c, m] - patches[1, c, m])
@@ -276,7 +313,7 @@ def _blend(patches, share):
 def guess_in_patch(nodes, slab, z, cell, patches, task, rows, count):
     """First guesses for the wanted nodes under a patch, into `rows` from `count` on; how many there are now.
 
-    Where there is no room they are only counted, and the last row is spoilt. `patches` (3, 6, 2): the cell's
+    Where there is no room they are only counted, and the last row is spoilt. `patches` (3, 6, 3): the cell's
     patch at the slab's end and at its start; the third is scratch. `z` [m] is the height of the fan.
     """
     bins, position = nodes.bins, nodes.position

@@ -24,7 +24,7 @@ from .edges import (
 )
 from .fan import FAN_ROWS, Launch, Sweep, fan_guesses, outward_of
 from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, widen
-from .flow import Array, Numbers, contains
+from .flow import Array, Numbers, contains, rises
 from .motion import LANES, is_clear, stays_inside
 from .patch import (
     GUESS_ANGLE,
@@ -34,12 +34,25 @@ from .patch import (
     GUESS_NODE,
     GUESS_OUTSIDE,
     GUESS_TASK,
+    GUESS_TIME,
     Guesses,
     Nodes,
     bin_range,
 )
 from .place import Pair, Place
-from .steer import AIM_INVERSE, AIM_MISS, AIM_ROWS, AIM_STATE, AIM_TIME, HIT, OPEN, aim, control_in, correct
+from .steer import (
+    AIM_INVERSE,
+    AIM_MISS,
+    AIM_ROWS,
+    AIM_STATE,
+    AIM_TIME,
+    FLOWN,
+    HIT,
+    OPEN,
+    aim,
+    control_in,
+    correct,
+)
 
 MAX_TRIES = 12
 """At most this many guesses are polished for one node."""
@@ -131,7 +144,7 @@ def checked_leg(medium, lanes, n):
 
 
 @kernel
-def _ranked(polar, position, points, tasks, guess):
+def _ranked(medium, position, points, tasks, guess):
     """How long a guess's leg takes [s], and its rank among those of its task and node; inf where it is too late.
 
     Those inside a cell go first, earliest first, then those outside, nearest first.
@@ -139,7 +152,9 @@ def _ranked(polar, position, points, tasks, guess):
     task = tasks[int(guess[GUESS_TASK])]
     deadline = task[TASK_DEADLINE]
     rise = abs(position[int(guess[GUESS_NODE]), 2] - points.position[int(task[TASK_ORIGIN]), 2])
-    time = rise / vertical_speed(polar, int(task[TASK_DIRECTION]), guess[GUESS_ANGLE])
+    time = rise / vertical_speed(medium.polar, int(task[TASK_DIRECTION]), guess[GUESS_ANGLE])
+    if rises(medium.flow):
+        time = max(guess[GUESS_TIME], 0.0)
     outside = guess[GUESS_OUTSIDE]
     if time > LATEST * deadline:
         return time, math.inf
@@ -161,13 +176,13 @@ def _sort_few(order, rank):
 
 
 @making
-def in_turn(polar, position, points, tasks, guesses):
+def in_turn(medium, position, points, tasks, guesses):
     """The order in which guesses are tried: by task and node, and among those by rank; the late ones left out."""
     rows, count = guesses
     time, rank, pair = np.empty(count), np.empty(count), np.empty(count)
     late = 0
     for n in range(count):
-        time[n], rank[n] = _ranked(polar, position, points, tasks, rows[n])
+        time[n], rank[n] = _ranked(medium, position, points, tasks, rows[n])
         pair[n] = rows[n, GUESS_TASK] * position.shape[0] + rows[n, GUESS_NODE]
         if rank[n] == math.inf:
             pair[n] = math.inf
@@ -198,14 +213,14 @@ def _aim_at(medium, position, points, tasks, guess, lanes, n):
     for m in range(4):
         lanes[AIM_INVERSE + m, n] = sign * guess[GUESS_INVERSE + m]
     control = guess[GUESS_ANGLE], guess[GUESS_HEADING]
-    aim(medium.polar, lanes, n, int(task[TASK_DIRECTION]), pair, *control, medium.integration.dt)
+    aim(medium, lanes, n, int(task[TASK_DIRECTION]), pair, *control)
 
 
 @kernel
 def _correct(medium, lanes, n, deadline):
     """Correct the control of lane n after its landing, so that it flies again; False if its guess is finished."""
     before = lanes[AIM_TIME, n]
-    correct(medium.polar, medium.integration, lanes, n)
+    correct(medium, lanes, n)
     time = lanes[AIM_TIME, n]
     return lanes[AIM_STATE, n] == OPEN and time - SURE * abs(time - before) <= deadline
 
@@ -250,7 +265,7 @@ def polish(medium, position, points, tasks, guesses, lanes):
     By task and node. A lane whose guess is settled takes the next one, so that all are always busy; none knows
     of the others.
     """
-    turns = in_turn(medium.polar, position, points, tasks, guesses)
+    turns = in_turn(medium, position, points, tasks, guesses)
     rows = guesses.rows
     found = nothing_found(turns, rows)
     # in the order of the nodes, so that neighbouring lanes fly through the same water
@@ -366,7 +381,8 @@ def horizon_of(medium):
 def launch_of(medium, points, task):
     """Return the fan of a task, with the steps of a fan."""
     origin = place_of(points, int(task[TASK_ORIGIN]))
-    return Launch(origin, int(task[TASK_DIRECTION]), medium.integration.dt * FAN_STEP)
+    longest = FLOWN * task[TASK_DEADLINE]
+    return Launch(origin, int(task[TASK_DIRECTION]), medium.integration.dt * FAN_STEP, longest)
 
 
 @making

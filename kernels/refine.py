@@ -18,6 +18,8 @@ from .patch import (
     GUESS_NODE,
     GUESS_OUTSIDE,
     GUESS_TASK,
+    GUESS_TIME,
+    LANDING_COLUMNS,
     Guesses,
     longer,
 )
@@ -33,7 +35,7 @@ from .reach import (
     horizon_of,
     polish,
 )
-from .steer import AIM_ROWS
+from .steer import AIM_ROWS, FLOWN
 
 TILT = 1e-3
 """A control is changed by this much [rad] to measure the derivatives of the flow map."""
@@ -76,7 +78,7 @@ def guess_of(vertex, landing, n, goal, guess):
     leap = max(abs(y_h * off_x - x_h * off_y), abs(x_a * off_y - y_a * off_x))
     if not leap < MAX_LEAP * abs(det):
         return False
-    guess[GUESS_OUTSIDE] = 0.0
+    guess[GUESS_OUTSIDE], guess[GUESS_TIME] = 0.0, landing[at, 2]
     guess[GUESS_ANGLE], guess[GUESS_HEADING] = vertex[at, VERTEX_ANGLE], vertex[at, VERTEX_HEADING]
     guess[GUESS_INVERSE], guess[GUESS_INVERSE + 1] = y_h / det, -x_h / det
     guess[GUESS_INVERSE + 2], guess[GUESS_INVERSE + 3] = -y_a / det, x_a / det
@@ -103,7 +105,7 @@ def candidate_guesses(medium, steering, pairs, edges, first, last, lanes):
     Source n has tasks 2 (n - first), which dives, and the next one, which climbs.
     """
     controls = np.empty((steering.candidates, 2))
-    vertex, landing = np.empty((3 * steering.candidates, 3)), np.empty((3 * steering.candidates, 2))
+    vertex, landing = np.empty((3 * steering.candidates, 3)), np.empty((3 * steering.candidates, LANDING_COLUMNS))
     level, begin = np.empty(1), np.int64(0)
     guesses = Guesses(np.empty((256, GUESS_COLUMNS)), 0)
     for n in range(first, last):
@@ -113,7 +115,7 @@ def candidate_guesses(medium, steering, pairs, edges, first, last, lanes):
             direction = direction_of(pair)
             tilted(medium.polar, direction, controls, count, vertex)
             level[0] = pair.goal.z
-            launch = Launch(pair.start, direction, medium.integration.dt)
+            launch = Launch(pair.start, direction, medium.integration.dt, FLOWN * horizon_of(medium))
             land_on_levels(medium, launch, level, vertex, landing, begin, 3 * count, lanes)
             task = 2 * (n - first) + direction
             guesses = guesses_on_line(vertex, landing, count, pair.goal, task, pairs.target[k], guesses)

@@ -4,8 +4,9 @@ import math
 
 from .cache import inlined, kernel
 from .control import control_towards, heading_of
-from .flight import FLIGHT_ROWS, ends_of, fly_for, keep_ends, place, rest
-from .motion import LANE_X, LANE_Y
+from .flight import FLIGHT_ROWS, START_T, ends_of, fly_to, keep_ends, place, rest
+from .flow import rises
+from .motion import LANE_T, LANE_X, LANE_Y
 
 LANDING_TOLERANCE = 0.009
 """A landing this close to its target [m] is a hit, if it is also within the scenario's tolerance."""
@@ -14,6 +15,8 @@ FIRST_STEP = 3.0
 MAX_ITERATIONS = 14
 GIVE_UP = 5
 """A guess is given up if it has not reduced its miss to a quarter by this iteration."""
+FLOWN = 1.25
+"""In a flow that rises a control flies for this multiple of the horizon at most."""
 MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
@@ -29,7 +32,7 @@ OPEN, HIT, LOST = 1.0, 2.0, 3.0
 
 
 @kernel
-def aim(polar, lanes, n, direction, pair, angle, heading, dt):
+def aim(medium, lanes, n, direction, pair, angle, heading):
     """Send lane n off on a guess of the control [rad] that leads from the pair's start to its goal.
 
     The rows from AIM_INVERSE on are the caller's.
@@ -37,7 +40,8 @@ def aim(polar, lanes, n, direction, pair, angle, heading, dt):
     keep_ends(lanes, n, pair)
     lanes[AIM_DIRECTION, n], lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n] = direction, angle, heading
     lanes[AIM_STATE, n], lanes[_ITERATION, n] = OPEN, 0.0
-    take_off(polar, lanes, n, FIRST_STEP * dt)
+    lanes[AIM_TIME, n] = 0.0
+    take_off(medium, lanes, n, FIRST_STEP * medium.integration.dt)
 
 
 @inlined
@@ -47,18 +51,33 @@ def control_in(polar, lanes, n):
 
 
 @kernel
-def take_off(polar, lanes, n, dt):
-    """Lane n's control, flown from its start to its goal's depth; steps as `motion.trace` takes them."""
-    c = control_in(polar, lanes, n)
+def take_off(medium, lanes, n, dt):
+    """Lane n's control, flown from its start to its goal's depth; steps as `motion.trace` takes them.
+
+    Its time is that of this flight; where the flow rises that is known after the landing, see `note_time`.
+    """
+    c = control_in(medium.polar, lanes, n)
     start, goal = ends_of(lanes, n)
     place(lanes, n, start, c)
-    lanes[AIM_TIME, n] = (goal.z - start.z) / c.w
-    fly_for(lanes, n, lanes[AIM_TIME, n], dt)
+    time = (goal.z - start.z) / c.w
+    if not rises(medium.flow):
+        lanes[AIM_TIME, n] = time
+    longest = FLOWN * medium.integration.dt * medium.integration.steps
+    fly_to(medium.flow, lanes, n, goal.z, time, longest, dt)
+
+
+@inlined
+def note_time(flow, lanes, n):
+    """Lane n has landed; in a flow that rises its time is known only now."""
+    if rises(flow):
+        lanes[AIM_TIME, n] = lanes[LANE_T, n] - lanes[START_T, n]
 
 
 @kernel
-def correct(polar, integration, lanes, n):
+def correct(medium, lanes, n):
     """Lane n has landed: on its target, HIT; nowhere near, LOST; else a Broyden step, and it flies again."""
+    polar, integration = medium.polar, medium.integration
+    note_time(medium.flow, lanes, n)
     direction = int(lanes[AIM_DIRECTION, n])
     _, goal = ends_of(lanes, n)
     off_x, off_y = lanes[LANE_X, n] - goal.x, lanes[LANE_Y, n] - goal.y
@@ -91,7 +110,7 @@ def correct(polar, integration, lanes, n):
     lanes[AIM_ANGLE, n] = angle
     lanes[AIM_HEADING, n] += shorten * turn_h
     lanes[_ITERATION, n] += 1.0
-    take_off(polar, lanes, n, integration.dt)
+    take_off(medium, lanes, n, integration.dt)
 
 
 @inlined

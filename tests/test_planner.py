@@ -7,8 +7,9 @@ import pytest
 from helpers.small import command, roadmap, scenario_file
 
 import glider_stream
-from glider_stream import opened, planner
+from glider_stream import planner
 from glider_stream.base.errors import InputError
+from glider_stream.opened import opening
 from glider_stream.roadmap.roadmap import Roadmap
 from glider_stream.roadmap.store import read_roadmap, write_roadmap
 from glider_stream.scenario import read_scenario
@@ -100,7 +101,7 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
         raise AssertionError("work was begun")
 
     monkeypatch.setattr(planner, "build_roadmap", work)
-    monkeypatch.setattr(opened, "read_any_roadmap", work)
+    monkeypatch.setattr(opening, "read_any_roadmap", work)
     with pytest.raises(InputError, match="make it first"):
         planner.build(scenario_file(tmp_path), tmp_path / "none" / "out.h5")
     with pytest.raises(InputError, match="make it first"):

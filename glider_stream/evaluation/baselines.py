@@ -12,6 +12,7 @@ from ..kernels.flow import contains, velocities
 from ..kernels.motion import rk4_step
 from ..kernels.place import Place, Velocity
 from ..roadmap.problem import Problem
+from ..water.inspect import require_level
 
 CELLS, DEPTHS, REACH = 48, 8, 3
 """Settings of the depth-averaged search.
@@ -51,6 +52,7 @@ def follow(flow, point, stops, speed, sink, floor, ceiling, t, dt, latest, near,
 
 def _flown(problem: Problem, start: Array, stops: Array, speed: float, sink: float, near: float = 0.0) -> float:
     evaluator = problem.evaluator
+    require_level(evaluator.flow, "a baseline's yo")
     integration = evaluator.integration
     latest, within = LONGEST * integration.dt * integration.steps, 2 * integration.tolerance
     depths = float(problem.lo[2]), float(problem.hi[2])

@@ -31,7 +31,7 @@ from scipy.ndimage import map_coordinates
 from ..base.arrays import Array
 from ..base.clock import span
 from ..base.settings import require
-from ..kernels.flow import velocities
+from ..kernels.flow import currents, rises, velocities
 from ..roadmap.nodes import YoSampler
 from ..roadmap.problem import Problem
 from ..water.inspect import is_steady
@@ -127,11 +127,16 @@ class Waters:
         self.steepest = max(sink for _, _, sink in hulls)
 
     def current(self, at: Array, since: float) -> Array:
-        """Current (u, v) [m/s] at points (n, 2 or 3), `since` [s] after departure; a mean where at has no z."""
+        """Current (u, v) [m/s] at points (n, 2 or 3), `since` [s] after departure; a mean where at has no z.
+
+        In a flow with a vertical part (u, v, w).
+        """
         if self.steady:
             since = 0.0
         x, y = (np.ascontiguousarray(at[:, n]) for n in range(2))
         when = np.full(len(at), self.departure + since)
+        if at.shape[1] == 3 and rises(self.flow):
+            return np.asarray(currents(self.flow, x, y, np.ascontiguousarray(at[:, 2]), when))
         if at.shape[1] == 3:
             return np.asarray(velocities(self.flow, x, y, np.ascontiguousarray(at[:, 2]), when))
         total = np.zeros((len(at), 2))
@@ -213,7 +218,8 @@ class Front:
         `sign` is -1 where the front moves against the current, from the goal.
         """
         waters, across = self.waters, np.zeros(end.size)
-        across[:2] = waters.current(end[None], 0.0)[0]
+        first = waters.current(end[None], 0.0)[0]
+        across[: first.size] = first
         seen = []
         for share in np.linspace(0.0, 1.0, PARTS):
             away = self.nodes - end - sign * share * self.tau * across
@@ -221,10 +227,14 @@ class Front:
             seen.append(waters.current(np.vstack([near, end]), share * self.tau))
         known = np.vstack(seen)
         carried = 0.5 * (known.min(axis=0) + known.max(axis=0))
-        off = float(np.hypot(*(known - carried).T).max())
-        began = self.tau / (1.0 + off / waters.fastest)
+        off = float(np.hypot(*(known - carried)[:, :2].T).max()) / waters.fastest
+        if (
+            carried.size == 3
+        ):  # in seconds of still water a second: a glider sinks more slowly than it moves across
+            off = float(waters.still_water_time(known - carried).max())
+        began = self.tau / (1.0 + off)
         place = end.copy()
-        place[:2] += sign * began * carried
+        place[: carried.size] += sign * began * carried
         return began, place
 
     def arrival(self) -> float:
@@ -251,9 +261,8 @@ class Front:
     def _current(self, since: float) -> list[Array]:
         """The current along each dimension at the nodes; against it where the front comes from the goal."""
         sign = -1.0 if self.backward else 1.0
-        u, v = sign * self.waters.current(self.nodes, since).T
-        parts = [u.reshape(self.shape), v.reshape(self.shape)]
-        return parts if len(self.shape) == 2 else [*parts, np.zeros(self.shape)]
+        parts = [part.reshape(self.shape) for part in sign * self.waters.current(self.nodes, since).T]
+        return parts if len(self.shape) == len(parts) else [*parts, np.zeros(self.shape)]
 
     def _moved(self, values: Array, ahead: float, current: list[Array], speeds: list[Array]) -> Array:
         """The values a step later, by three stages (Shu and Osher 1988)."""
@@ -332,6 +341,8 @@ def bound(
     """
     size = dimensions_of(problem) if dimensions is None else dimensions
     require(size in (2, 3), f"`dimensions` must be 2 or 3; got {dimensions}")
+    flat = "a bound in 2 dimensions knows no vertical current, and this flow has one; give 3 dimensions"
+    require(size == 3 or not rises(problem.evaluator.flow), flat)
     finest = NODES[size] if nodes is None else nodes
     require(finest >= FEWEST, f"`nodes` must be at least {FEWEST}; got {nodes}")
     waters = Waters(problem, size)

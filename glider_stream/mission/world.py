@@ -11,7 +11,7 @@ from ..base.settings import require
 from ..kernels import flow as kernel
 from ..kernels.flow import velocities
 from ..roadmap.problem import Problem
-from ..water.inspect import divergence_ratio, is_steady
+from ..water.inspect import divergence_ratio, is_steady, require_level
 from ..water.ocean.flow import grid_flow, slots
 from ..water.sampled import sample_flow
 from .error_field import OnMesh, error_field
@@ -72,6 +72,7 @@ class Worlds:
         forecast = mission.scenario.problem() if mission.truth is not None else self.true
         until = self.true.departure + mission.arrival.longest
         for name, problem in (("true current", self.true), ("forecast", forecast)):
+            require_level(problem.evaluator.flow, f"a mission's {name}")
             known = problem.evaluator.flow.extent
             cure = "shorten `arrival.longest_hours`, or leave earlier"
             why = f"a run may last until {until:g} s, and the {name} is known until {known.t_hi:g} s; {cure}"

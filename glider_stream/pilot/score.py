@@ -16,6 +16,8 @@ REASONS = {
     Status.NO_HIT: "no glide angle and heading lead there; move the stop with the current, or change its depth",
     Status.BLOCKED: "every glide there touches land, seabed or a keep-out area; move it into open water",
     Status.OUTSIDE_FLOW: "one of its ends lies outside the current's grid; stay within the domain",
+    Status.CARRIED_AWAY: "the water rises or sinks there faster than any glide against it; go where it is"
+    " calmer, or leave at another time",
     Status.SAME_DEPTH: "one glide changes depth, its ends lie at the same, and the roadmap has no way between;"
     " put a stop at another depth between",
 }

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
-from ..kernels.flow import Flow
+from ..kernels.flow import Flow, currents, rises
 from ..kernels.terrain import Terrain
 from ..search.path import SURFACE
 from ..water.inspect import is_steady
@@ -182,7 +182,8 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
     at = np.linspace(rows[0, 0], rows[-1, 0], ARROWS)[1:-1]
     x, y, z = (np.interp(at, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
     begins = departure if path.departure is None else path.departure
-    u, v = sample_field(flow, x, y, z, begins + (0.0 * at if path.frozen else at))
+    when = begins + (0.0 * at if path.frozen else at)
+    u, v = sample_field(flow, x, y, z, when)
     fastest = float(np.nanmax(np.hypot(u, v), initial=0.0)) or 1.0
     power = 10.0 ** np.floor(np.log10(fastest))
     key = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= fastest)
@@ -191,6 +192,18 @@ def _draw_profile(ax: "Axes", flow: Flow, path: "Path", rows: Array, departure: 
     ax.quiverkey(arrows, 0.95, 1.065, key, f"{key:g} m/s", labelpos="W", coordinates="axes")
     ax.set_yticks([tick for tick in ax.get_yticks() if 0.0 <= tick <= depth.max() + 0.3 * span])
     ax.set(xlabel=f"Time since departure ({name})", ylabel="Depth (m)")
-    ax.set_title("(c) Depth against time, legs numbered; arrows: the horizontal current on the way, north up")
+    title = "(c) Depth against time, legs numbered; arrows: the horizontal current on the way, north up"
+    if rises(flow):
+        title += "; dotted: the vertical current, upward"
+        _draw_rise(ax, at / unit, currents(flow, x, y, z, when)[:, 2])
+    ax.set_title(title)
     bar = ax.figure.colorbar(line, ax=ax, label="Depth of the route (m)", aspect=12, pad=0.01)
     bar.ax.invert_yaxis()
+
+
+def _draw_rise(ax: "Axes", time: Array, rise: Array) -> None:
+    """Draw the vertical current on the way (n,) [m/s] over the profile, on an axis of its own."""
+    beside = ax.twinx()
+    most = 1.1 * float(np.abs(rise).max()) or 1.0
+    beside.plot(time, rise, color=INK, linestyle=":", linewidth=1.4, zorder=9)
+    beside.set(ylim=(-most, most), ylabel="Vertical current (m/s)")

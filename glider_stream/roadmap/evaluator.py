@@ -66,11 +66,20 @@ class Evaluator:
         pairs = Pairs(nodes, departs, sources, rows, targets)
         connector = self.steering.connector
         if connector is None:
-            return self._connect_by_fan(pairs)
+            return self._explained(pairs, self._connect_by_fan(pairs))
+        if flow.rises(self.flow) and connector is connect.connect_nodes:
+            connector = connect.connect_rising
         result = np.empty((targets.size, EDGE_COLUMNS))
         task = partial(connector, self.medium, self.steering.kernel(), pairs, result)
         in_parallel(task, sources.size, NODES_AT_ONCE)
-        return result
+        return self._explained(pairs, result)
+
+    def _explained(self, pairs: Pairs, outcomes: Array) -> Array:
+        """Say of pairs without a leg where the water alone forbids one: in a flow that rises."""
+        if flow.rises(self.flow):
+            task = partial(connect.carried_away, self.medium, pairs, outcomes)
+            in_parallel(task, pairs.source.size, NODES_AT_ONCE)
+        return outcomes
 
     def _connect_by_fan(self, pairs: Pairs) -> Array:
         source, result = pairs.source, np.empty((pairs.target.size, EDGE_COLUMNS))
@@ -94,8 +103,11 @@ class Evaluator:
 
     @property
     def flies_backward(self) -> bool:
-        """Whether one fan that is flown back in time can find all legs to a point."""
-        return self.exact and is_steady(self.flow)
+        """Whether one fan that is flown back in time can find all legs to a point.
+
+        Not in a flow that rises: there a path may pass the depth of its start again, where the fan would end it.
+        """
+        return self.exact and is_steady(self.flow) and not flow.rises(self.flow)
 
     def by_fan(self) -> "Evaluator":
         """Return the same evaluator with steering by the flow map."""
@@ -172,7 +184,8 @@ class Evaluator:
         require(height != origin.z, f"a control cannot land at its own height; got {height:g} m for both")
         angles, headings = (np.require(a, np.float64, ["C", "W"]) for a in (glide_angle, heading))
         direction = control.CLIMB if height > origin.z else control.DIVE
-        launch = fan.Launch(origin, direction, self.integration.dt)
+        horizon = self.integration.dt * self.integration.steps
+        launch = fan.Launch(origin, direction, self.integration.dt, horizon)
         where: Array = fan.landings(self.medium, launch, float(height), angles, headings)
         return where
 

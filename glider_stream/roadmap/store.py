@@ -48,6 +48,8 @@ _DESCRIBED = {
     "edges/miss": ("f8", "m", "distance from the target at closest approach"),
     "pairs/by_node": ("i4", "1", "pairs of each row of edges by status, named by the attribute `statuses`"),
 }
+RARE = (Status.CARRIED_AWAY,)
+"""The last statuses, which only flows with a vertical part know: a file names them where it counts a pair."""
 _OPTIONAL = {"nodes/lonlat", "pairs/by_node"}
 _SLICES = "slices/departure"
 
@@ -136,8 +138,10 @@ class RoadmapWriter:
             raise RuntimeError(f"the edges of node {self._next:,} are missing; no file is made")
         degree = np.concatenate([np.zeros(1, np.int64), *self._degree])
         self._put("edges/indptr", np.cumsum(degree))
-        by_name = tally.by_name()
-        self._put("pairs/by_node", np.concatenate([np.empty((0, len(by_name)), np.int32), *self._counts]))
+        counts = np.concatenate([np.empty((0, len(Status)), np.int32), *self._counts])
+        named = [status for status in Status if status not in RARE or tally.counts[status] > 0]
+        by_name = {name: tally.by_name()[name] for name in (status.name.lower() for status in named)}
+        self._put("pairs/by_node", counts[:, named])
         self._file["pairs/by_node"].attrs["statuses"] = " ".join(by_name)
         pairs = self._file["pairs"]
         pairs.attrs["evaluated"] = sum(by_name.values())
@@ -256,6 +260,7 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
         departures = _departures(file, path)
         arrays = _arrays(file, path, _names())
         slices = 1 if departures is None else departures.size
+        _with_every_status(arrays)
         _check_edges(arrays, len(arrays["nodes/position"]) * slices, path)
         wall, used = _effort(file, path)
         pairs = file["pairs"].attrs
@@ -312,6 +317,7 @@ def read_part(path: str | Path, edges: bool = True) -> Part:
         nodes = np.arange(*shard.rows(len(arrays["nodes/position"]), slices))
         found = None
         if edges:
+            _with_every_status(arrays)
             _check_edges(arrays, len(nodes), path)
             values = np.stack([arrays[f"edges/{name}"] for name in EDGE_FIELDS], axis=1)
             require(
@@ -383,6 +389,13 @@ def _arrays(file: h5py.File, path: Path, names: list[str]) -> dict[str, AnyArray
         finite = bool(np.isfinite(arrays[name]).all())
         require(finite, f"the roadmap {path} is damaged: {name} holds NaN or infinity; build it again")
     return arrays
+
+
+def _with_every_status(arrays: dict[str, AnyArray]) -> None:
+    """Put zeros, in place, for the last statuses where a file does not name them."""
+    counts = arrays.get("pairs/by_node")
+    if counts is not None and counts.ndim == 2 and counts.shape[1] == len(Status) - len(RARE):
+        arrays["pairs/by_node"] = np.pad(counts, ((0, 0), (0, len(RARE))))
 
 
 def _check_edges(arrays: dict[str, AnyArray], rows: int, path: Path) -> None:

@@ -17,8 +17,8 @@ from ..base.threads import in_parallel, threads
 from ..kernels.cache import entry_point
 from ..kernels.control import control_of, glide_speed
 from ..kernels.edges import CONNECTED, EDGE_COLUMNS, GLIDE_ANGLE, HEADING, SPEED, TIME
-from ..kernels.flow import velocities
-from ..kernels.motion import rk4_step
+from ..kernels.flow import currents, rises, velocities
+from ..kernels.motion import step_on
 from ..kernels.place import Place
 from .evaluator import Evaluator
 from .problem import Problem
@@ -109,18 +109,25 @@ def replayed_misses(
         flow_u, flow_v = velocities(evaluator.flow, *at.reshape(2, -1), z + along * w, t + along).T
         return np.concatenate([(flow_u + u) * duration, (flow_v + v) * duration])
 
+    def rising(share: float, at: Array, u: Array, v: Array, w: Array, duration: Array, t: Array) -> Array:
+        flow_uvw = currents(evaluator.flow, *at.reshape(3, -1), t + share * duration)
+        return np.asarray(((flow_uvw.T + np.stack([u, v, w])) * duration).ravel())
+
     off = np.empty(len(values))
+    how: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-7, "max_step": 0.02}
     for first in range(0, len(values), LEGS_AT_ONCE):
         some = slice(first, first + LEGS_AT_ONCE)
         (x, y, z), goal, row = position[source[some]].T, position[target[some]].T, values[some].T
         angle, heading, speed = (row[column[name]] for name in ("glide_angle", "heading", "speed"))
         along, w, duration = speed * np.cos(angle), speed * np.sin(angle), row[column["time"]]
         through = along * np.cos(heading), along * np.sin(heading), w
-        path = solve_ivp(
-            rate, (0, 1), np.concatenate([x, y]), args=(z, *through, duration, departs[some]), method="DOP853",
-            rtol=1e-10, atol=1e-7, max_step=0.02,
-        )  # fmt: skip
-        end = *path.y[:, -1].reshape(2, -1), z + duration * w
+        if rises(evaluator.flow):
+            begin, args = np.concatenate([x, y, z]), (*through, duration, departs[some])
+            end = tuple(solve_ivp(rising, (0, 1), begin, args=args, **how).y[:, -1].reshape(3, -1))
+        else:
+            begin, fixed = np.concatenate([x, y]), (z, *through, duration, departs[some])
+            path = solve_ivp(rate, (0, 1), begin, args=fixed, **how)
+            end = *path.y[:, -1].reshape(2, -1), z + duration * w
         off[some] = np.linalg.norm(np.array(end) - goal, axis=0)
     return off
 
@@ -140,12 +147,17 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
             continue  # a damaged file may hold any value
         c = control_of(speed, angle, edges[e, HEADING])
         x, y, z = position[source[e]]
+        height = z
         full = int(time / dt)
         for n in range(full + 1):
-            here = Place(x, y, z + n * dt * c.w, departure + n * dt)
-            x, y = rk4_step(medium.flow, here, c, min(dt, time - n * dt))
+            if not rises(medium.flow):
+                height = z + n * dt * c.w
+            here = Place(x, y, height, departure + n * dt)
+            x, y, height = step_on(medium.flow, here, c, min(dt, time - n * dt))
+        if not rises(medium.flow):
+            height = z + time * c.w
         goal = position[target[e]]
-        off[e, 0] = np.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z + time * c.w - goal[2]) ** 2)
+        off[e, 0] = np.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (height - goal[2]) ** 2)
         off[e, 1] = speed - glide_speed(medium.polar, 1 if angle > 0.0 else 0, abs(angle))
 
 

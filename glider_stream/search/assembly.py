@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..kernels.edges import Edge, Status
+from ..kernels.flow import rises
 from ..roadmap.problem import Problem
 from ..water.frame import true_north
 from ..water.inspect import is_steady
@@ -75,12 +76,17 @@ class Assembly:
             rows[[0, -1], 0] = clock, clock + edge.time
             control = edge.glide_angle, edge.heading, edge.speed
             ends, track = self._lonlat(source, target), self._lonlat(*rows[:, 1:])
-            north = self._north(source)
-            legs.append(
-                Leg(source, target, *control, clock, edge.time, edge.miss, rows, ends, track, north, edge.cost)
-            )
+            north, lifted = self._north(source), self._lifted(edge, rows)
+            times = clock, edge.time, edge.miss
+            legs.append(Leg(source, target, *control, *times, rows, ends, track, north, edge.cost, lifted))
             clock += edge.time
         return self._titled(start, goal, self.cost(hops), tuple(legs))
+
+    def _lifted(self, edge: Edge, rows: Array) -> float:
+        """Return how far [m] the water has lifted the glider on a leg; 0 in a flow without a vertical part."""
+        if not rises(self.problem.evaluator.flow):
+            return 0.0
+        return float(rows[-1, 3] - rows[0, 3]) - edge.speed * math.sin(edge.glide_angle) * edge.time
 
     def no_path(self, start: Array, goal: Array, why: str = "") -> Path:
         """Return a path that is not found, with the reason `why`."""

@@ -17,6 +17,7 @@ from ..base.settings import require
 from ..kernels.edges import Edge, Status
 from ..roadmap.problem import Problem
 from ..water.frame import true_north
+from ..water.inspect import require_level
 from .assembly import Assembly
 from .glides import Air, Glides
 from .path import SURFACE, Leg, Path
@@ -122,6 +123,7 @@ def flown_on(path: Path, since: float, place: Array, problem: Problem) -> FlownO
 
     The problem leaves at the fix. The clock runs. The vehicle keeps the compass bearings of the plan.
     """
+    require_level(problem.evaluator.flow, "the rest of a plan, flown on with its own trims,")
     assembly = Assembly(problem, frozen=False)
     first = next_leg(path, since)
     hops: list[tuple[Array, Array, Edge]] = []

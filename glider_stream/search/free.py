@@ -66,8 +66,8 @@ class FreeAir(Air):
     def _longest(self, angle: Array) -> Array | float:
         return LONGEST_CHANGE * angle
 
-    def _time_slopes(self, begin: Array, end: Array, glides: Glides, angle: Array) -> Array:
-        return angle
+    def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
+        return by[0]
 
     def _flights(self, row: Array) -> tuple[Array, Array]:
         time, heading = row[:, ANGLE], row[:, HEADING]

@@ -9,13 +9,17 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.threads import in_parallel
+from ..kernels.flow import rises
 from ..kernels.legs import fly_legs, legs_fit
+from ..kernels.steer import FLOWN
 from ..roadmap.evaluator import Evaluator
 
 LEGS_AT_ONCE = 1024
 """A thread flies this many legs at a time, which takes milliseconds; with fewer the threads' start costs more."""
 CLOSE = 1e-5
 """A leg that ends within this distance [m] of its stop is exact: hundreds of legs add up to a few millimetres."""
+AGREED = 1e-6
+"""Legs of a route in a flow that rises have found their times when these change by less [s]."""
 MOST_STEPS = 12
 """At most this many Newton steps are made from a guess; a near guess needs two or three."""
 LONGEST_TURN = 0.3
@@ -72,15 +76,18 @@ class Air:
         angle, heading = angle.copy(), heading.copy()
         lowest, highest = self.limits(begin, end)
         left: Array | float = departs
+        flown: Array | None = None
         for _ in range(MOST_STEPS):
-            time = self.times(begin, end, angle)
+            time = self._expected(begin, end, angle, flown)
             if np.ndim(departs) == 0:
                 left = departs + np.concatenate([[0.0], np.cumsum(time)[:-1]])
             of = np.column_stack([begin, left, end[:, 2], angle, heading])
-            ends = self._ends(np.stack([of, *(of + self._step(n) for n in (ANGLE, HEADING))]))
+            landings = self._landings(np.stack([of, *(of + self._step(n) for n in (ANGLE, HEADING))]))
+            ends, flown = landings[..., :2], landings[0, :, 2]
             off = end[:, :2] - ends[0]
             miss = np.hypot(*off.T)
-            if (miss <= CLOSE).all() or not np.isfinite(miss).any():
+            settled = bool((miss <= CLOSE).all()) and self._settled(time, flown)
+            if settled or not np.isfinite(miss).any():
                 break
             by_angle, by_heading = ((ends[1 + n] - ends[0]) / self.steps[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
@@ -97,22 +104,29 @@ class Air:
         """
         of = self._rows(begin, end, glides)
         if one_sided:
-            ends = self._ends(np.stack([of, *(of + self._step(n) for n in range(7))]))
+            ends = self._landings(np.stack([of, *(of + self._step(n) for n in range(7))]))
             by = (ends[1:] - ends[0]) / self.steps[:, None, None]
         else:
             beside = [of + sign * self._step(n) for n in range(7) for sign in (1.0, -1.0)]
-            ends = self._ends(np.stack(beside))
-            by = (ends[0::2] - ends[1::2]) / (2 * self.steps[:, None, None])  # (7, n, 2)
+            ends = self._landings(np.stack(beside))
+            by = (ends[0::2] - ends[1::2]) / (2 * self.steps[:, None, None])  # (7, n, 3)
+        by, later = by[..., :2], by[..., 2]
         # the leg must end at its stop, so the control undoes every other change of the leg's end
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
         control = np.stack([_solve(by[ANGLE], by[HEADING], off) for off in moved], axis=1)
         angle = control[..., 0]
-        return Slopes(self._time_slopes(begin, end, glides, angle), angle, control[..., 1])
+        time = self._time_slopes(begin, end, glides, (angle, control[..., 1], later))
+        return Slopes(time, angle, control[..., 1])
 
-    def _time_slopes(self, begin: Array, end: Array, glides: Glides, angle: Array) -> Array:
-        """Return the derivatives (n, 7) of the times, from those of the controls `angle` (n, 7)."""
+    def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
+        """Return the derivatives (n, 7) of the times.
+
+        `by`: those of the controls, angle and heading (n, 7), and those of the flights' times (7, n) by the
+        columns of a leg's parameters.
+        """
+        angle = by[0]
         climbs = end[:, 2] > begin[:, 2]
         sinks = self.sinking(glides.angle, climbs)
         ahead, behind = (self.sinking(glides.angle + sign * STEPS[ANGLE], climbs) for sign in (1.0, -1.0))
@@ -170,6 +184,14 @@ class Air:
         along = self.speed(angle, climbs) * np.cos(angle)
         return np.stack([along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1)
 
+    def _expected(self, begin: Array, end: Array, angle: Array, flown: Array | None) -> Array:
+        """Return the times (n,) [s] of legs that fly next; they took `flown` (n,) [s] before, if they flew."""
+        return self.times(begin, end, angle)
+
+    def _settled(self, expected: Array, flown: Array) -> bool:
+        """Return whether legs have taken the times that the departures of those after them count on."""
+        return True
+
     def times(self, begin: Array, end: Array, angle: Array) -> Array:
         """Return the times (n,) [s] of legs with glide angles (n,) [rad]."""
         rise = end[:, 2] - begin[:, 2]
@@ -198,19 +220,49 @@ class Air:
 
     def _ends(self, of: Array) -> Array:
         """Return the ends x, y (m, n, 2) [m] of legs with parameters (m, n, 7)."""
+        return self._landings(of)[..., :2]
+
+    def _landings(self, of: Array) -> Array:
+        """Return the ends and the times x, y [m], t [s] (m, n, 3) of legs with parameters (m, n, 7)."""
         row = of.reshape(-1, 7)
         through, time = self._flights(row)
-        start = np.ascontiguousarray(row[:, [X, Y, Z, T]])
-        ends = np.full((len(row), 2), np.nan)
-        task = partial(fly_legs, self.evaluator.flow, start, through, time, self.evaluator.integration.dt, ends)
-        in_parallel(task, len(row), LEGS_AT_ONCE)
-        return ends.reshape(*of.shape[:2], 2)
+        start, height = np.ascontiguousarray(row[:, [X, Y, Z, T]]), np.ascontiguousarray(row[:, Z_END])
+        ends = np.full((len(row), 3), np.nan)
+        integration = self.evaluator.integration
+        longest = FLOWN * integration.dt * integration.steps
+        how = self.evaluator.flow, start, through, time, height, longest, integration.dt
+        in_parallel(partial(fly_legs, *how, ends), len(row), LEGS_AT_ONCE)
+        return ends.reshape(*of.shape[:2], 3)
 
     def _step(self, n: int) -> Array:
         """Return the step (7,) that changes only parameter `n` of a leg."""
         step = np.zeros(7)
         step[n] = self.steps[n]
         return step
+
+
+@dataclass(frozen=True)
+class RisingAir(Air):
+    """Computes legs as `Air` does, in a flow with a vertical part: the times of legs are known after they fly."""
+
+    def _expected(self, begin: Array, end: Array, angle: Array, flown: Array | None) -> Array:
+        guess = self.times(begin, end, angle)
+        return guess if flown is None else np.where(np.isfinite(flown), flown, guess)
+
+    def _settled(self, expected: Array, flown: Array) -> bool:
+        return bool((np.abs(flown - expected) <= AGREED).all())
+
+    def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
+        angle, heading, later = by
+        time = later[ANGLE][:, None] * angle + later[HEADING][:, None] * heading
+        for column, parameter in ((0, X), (1, Y), (2, Z), (5, Z_END), (6, T)):
+            time[:, column] += later[parameter]
+        return np.asarray(time)
+
+
+def air_of(evaluator: Evaluator) -> Air:
+    """Return the object that computes legs in the water of an evaluator."""
+    return RisingAir(evaluator) if rises(evaluator.flow) else Air(evaluator)
 
 
 def _solve(by_first: Array, by_second: Array, off: Array) -> Array:

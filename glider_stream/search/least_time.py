@@ -3,8 +3,9 @@
 Along a direction d a glider moves no faster than Vh + M. Vh is its best horizontal speed. M is the greatest
 current along d on the line across d that the glider passes. So the time from a to b is at least the integral of
 ds / (Vh + M(s)) between their places on d. This is a difference of two potentials; each direction gives one
-bound. The depth gives another bound: |dz| over the greatest vertical speed. A difference of potentials obeys the
-triangle inequality, so along a leg the bound of the remaining time never falls faster than the clock runs.
+bound. The depth gives another bound: |dz| over the greatest vertical speed, the water's with it. A difference of
+potentials obeys the triangle inequality, so along a leg the bound of the remaining time never falls faster than
+the clock runs.
 """
 
 import math
@@ -29,9 +30,10 @@ SPARE = 0.02
 """The current between the points at which a formula is read may be higher by this share of the greatest speed."""
 
 
-def fastest_sink(polar: Polar) -> float:
-    """Return the greatest vertical speed of any glide [m/s]."""
-    return max(float(vertical_speed(polar, way, polar.steepest[way])) for way in (DIVE, CLIMB))
+def fastest_sink(polar: Polar, flow: kernel.Flow) -> float:
+    """Return the greatest vertical speed over ground of any glide [m/s]."""
+    glide = max(float(vertical_speed(polar, way, polar.steepest[way])) for way in (DIVE, CLIMB))
+    return glide + kernel.max_rise(flow)
 
 
 class GreatestSpeeds:
@@ -41,14 +43,17 @@ class GreatestSpeeds:
         """Read the flow where gliders may pass between nodes (n, 3) [m], from the time `since` [s] on."""
         flow, polar = problem.evaluator.flow, problem.evaluator.polar
         self.through = float(polar.best_horizontal.max())
-        self.sink = fastest_sink(polar)
+        self.sink = fastest_sink(polar, flow)
         angle = np.arange(DIRECTIONS) * (2 * math.pi / DIRECTIONS)
         self.directions = np.stack([np.cos(angle), np.sin(angle)])
         low, high = _box(flow, problem, position)
         size = float((high - low).max()) / CELLS
         nx, ny = (max(1, math.ceil(side / size)) for side in high - low)
         x, y = low[0] + (np.arange(nx) + 0.5) * size, low[1] + (np.arange(ny) + 0.5) * size
-        fastest = greatest(flow, x, y, size, (float(problem.lo[2]), 0.0), since, self.directions)
+        integration = problem.evaluator.integration
+        # water that sinks may carry a glider below the nodes before it climbs
+        lowest = float(problem.lo[2]) - kernel.max_rise(flow) * integration.dt * integration.steps
+        fastest = greatest(flow, x, y, size, (lowest, 0.0), since, self.directions)
         self.scales = [
             self._scale(x[:, None] * d[0] + y[None, :] * d[1], fastest[n], size)
             for n, d in enumerate(self.directions.T)
@@ -124,7 +129,7 @@ def greatest(
     The cells have the middles x, y and the side `size` [m]. All heights within `z` [m] and all times from `since`
     [s] on count.
     """
-    if isinstance(flow, kernel.OceanGrid):
+    if isinstance(flow, (kernel.OceanGrid, kernel.RisingOceanGrid)):
         return _of_grid(flow, x, y, size, z, since, directions)
     period = kernel.cycle(flow)
     if math.isinf(period):  # the flow has neither a period nor a grid, so no set of times is enough
@@ -144,7 +149,7 @@ def greatest(
 
 
 def _of_grid(
-    flow: kernel.OceanGrid,
+    flow: kernel.OceanGrid | kernel.RisingOceanGrid,
     x: Array,
     y: Array,
     size: float,
@@ -159,7 +164,7 @@ def _of_grid(
     known = np.full((directions.shape[1], *flow.values.shape[2:4]), -np.inf)
     for moment in flow.values[first:, low:high]:
         for level in moment:
-            known = np.maximum(known, np.moveaxis(level @ directions, -1, 0))
+            known = np.maximum(known, np.moveaxis(level[..., :2] @ directions, -1, 0))
     near = _indices(flow, x, y)
     # the number of indices that a cell spans; the map of indices is smooth
     moved = _indices(flow, x + size, y), _indices(flow, x, y + size)
@@ -170,7 +175,7 @@ def _of_grid(
     return np.minimum(wide[:, i, j], flow.extent.max_speed)
 
 
-def _indices(flow: kernel.OceanGrid, x: Array, y: Array) -> Array:
+def _indices(flow: kernel.OceanGrid | kernel.RisingOceanGrid, x: Array, y: Array) -> Array:
     """Return fractional grid indices (2, nx, ny) at places [m]; outside the grid they stay at its edge."""
     at = np.meshgrid((x - flow.extent.x_lo) * flow.per_x, (y - flow.extent.y_lo) * flow.per_y, indexing="ij")
     return np.stack([map_coordinates(flow.index_map[..., n], at, order=1, mode="nearest") for n in range(2)])

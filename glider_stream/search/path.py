@@ -2,6 +2,7 @@
 
 import json
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -42,6 +43,7 @@ class Leg:
     `end`, at the distance `miss` [m]. In a geographic scenario `lonlat` (2, 2) [degrees] are start and end,
     `track` (m, 2) [degrees] is the trajectory, and `north` [rad] is the direction of true north,
     counter-clockwise from the frame's +y. `cost` is the cost of this leg.
+    `lifted` [m] is how far the water lifts the glider on the way, below 0 if it sinks.
 
     Examples:
         >>> leg = road.query().legs[0]
@@ -64,6 +66,7 @@ class Leg:
     track: Array | None = None
     north: float = 0.0
     cost: float = 0.0
+    lifted: float = 0.0
 
     @property
     def compass(self) -> float:
@@ -81,6 +84,7 @@ class Leg:
             "depart_s": self.depart,
             "duration_s": self.duration,
             "miss_m": self.miss,
+            **({"lifted_m": self.lifted} if self.lifted else {}),
             "trajectory": self.trajectory.tolist(),
         }
 
@@ -94,6 +98,7 @@ class Leg:
             f"{moment(departs, self.depart):>9}  {way} {begin:7.0f} m to {end:6.0f} m{place}  "
             f"glide {glide:6.1f} deg  compass {self.compass:5.1f} deg  "
             f"{self.duration:7,.0f} s  miss {self.miss:.2f} m"
+            + (f"  lifted {self.lifted:.1f} m" if self.lifted else "")
         )
 
 
@@ -146,6 +151,11 @@ class Origin:
     departure: float = 0.0
     most_yos: int | None = None
     most_hours: float | None = None
+
+    @property
+    def clearance(self) -> float:
+        """The distance [m] that the plan keeps above the seabed; 0 where the scenario names none."""
+        return float(tomllib.loads(self.scenario).get("terrain", {}).get("clearance", 0.0))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the table that is written to the path file."""
@@ -365,7 +375,13 @@ def _read_origin(table: Any, file: str | File) -> Origin:
     where = f"`origin` of the path file {file}"
     require(isinstance(table, dict), f"{where} must be a table; got {table!r}; write it with `query -o`")
     rest = {"departure" if name == "departure_s" else name: value for name, value in table.items()}
-    return from_table(Origin, rest, where)
+    origin = from_table(Origin, rest, where)
+    try:
+        known = math.isfinite(origin.clearance)
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        known = False
+    require(known, f"the scenario in {where} is no scenario's text; write it with `query -o`")
+    return origin
 
 
 def _read_leg(leg: Any, where: str) -> Leg:
@@ -375,7 +391,8 @@ def _read_leg(leg: Any, where: str) -> Leg:
     require(min(speed, depart, duration, miss) >= 0, f"{where} has a speed, time or miss below 0")
     start, end = (_numbers(leg, name, where, 3) for name in ("from", "to"))
     rows = _numbers(leg, "trajectory", where, None, 4)
-    return Leg(start, end, angle, heading, speed, depart, duration, miss, rows)
+    lifted = float(_numbers({"lifted_m": 0.0, **leg}, "lifted_m", where))
+    return Leg(start, end, angle, heading, speed, depart, duration, miss, rows, lifted=lifted)
 
 
 def _check_legs(legs: tuple[Leg, ...]) -> None:
@@ -386,7 +403,7 @@ def _check_legs(legs: tuple[Leg, ...]) -> None:
     """
     here, clock = legs[0].start, legs[0].depart
     for n, leg in enumerate(legs, 1):
-        rows, rises = leg.trajectory, leg.speed * math.sin(leg.glide_angle) * leg.duration
+        rows, rises = leg.trajectory, leg.speed * math.sin(leg.glide_angle) * leg.duration + leg.lifted
         most = BESIDE * max(1.0, math.dist(leg.start, leg.end))
         late = [leg.depart - clock, rows[0, 0] - leg.depart, rows[-1, 0] - leg.depart - leg.duration]
         odd = {

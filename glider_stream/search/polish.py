@@ -19,7 +19,7 @@ from scipy.linalg import LinAlgError, solveh_banded
 from ..base.arrays import Array
 from ..kernels.edges import Edge, Status
 from ..roadmap.problem import Problem
-from .glides import Air, Glides, Slopes
+from .glides import Air, Glides, Slopes, air_of
 from .path import Hop, Path
 
 LEAST_RISE = 0.05
@@ -96,7 +96,7 @@ class Polisher:
     @property
     def air(self) -> Air:
         """The object that computes legs."""
-        return Air(self.problem.evaluator)
+        return air_of(self.problem.evaluator)
 
     def glide(self, stops: Array, angle: Array, heading: Array) -> Glides:
         """Return the legs between stops; each leaves when the one before arrives, if frozen at the departure."""

@@ -156,7 +156,7 @@ class Planner(RoutePlanner):
         legs = [None if at.legs is None else Fan(at.legs.nodes, at.legs.outcomes) for at in (begin, end)]
         ends = RoadmapEnds(begin.point, end.point, begin.nodes, end.nodes, legs[0], legs[1], direct)
         expansion, evaluator, departure = RoadmapExpansion(self.roadmap, ends), self.problem.evaluator, 0.0
-        left = LeftInRoadmap(expansion, fastest_sink(evaluator.polar))
+        left = LeftInRoadmap(expansion, fastest_sink(evaluator.polar, evaluator.flow))
         aim = Aim(front=True)
         search = LabelSearch(expansion, evaluator.cost, rule, left, expansion.goals, departure, aim)
         found = [n for n in search.settled() if search.is_goal[search.labels[n].place]]

@@ -392,7 +392,8 @@ class Refiner:
         """Return the legs of a round, without legs that lead away from the goal or gain less than they cost."""
         evaluator, price = problem.evaluator, problem.evaluator.cost.kernel()
         position, integration = guess.position, evaluator.integration
-        sink, level = fastest_sink(evaluator.polar), float(evaluator.polar.best_horizontal.max())
+        sink = fastest_sink(evaluator.polar, evaluator.flow)
+        level = float(evaluator.polar.best_horizontal.max())
         unsure = DOUBT / FINER * max(cells.spacing / level, cells.rise / sink if cells.between else 0.0)
         current = velocities(evaluator.flow, *np.ascontiguousarray(position.T), guess.when)
         reach = (level + float(np.hypot(*current.T).max())) * integration.dt * integration.steps

@@ -12,13 +12,13 @@ import numpy as np
 
 from ..base.arrays import Array, Index
 from ..base.settings import require
-from ..kernels.control import CLIMB, DIVE, vertical_speed
 from ..kernels.edges import CONNECTED, STATUS, TIME, edge_of
 from ..kernels.timetable import earliest_arrivals
 from ..roadmap.pairs import Attached, NeighbourLegs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.slices import SlicedRoadmap
+from .least_time import fastest_sink
 from .path import Hop
 
 AGREES = 0.01
@@ -277,7 +277,7 @@ class _Query:
         if not evaluator.exact:  # each leg may end beside its target by as much as the tolerance
             return np.zeros(len(points))
         polar, flow = evaluator.polar, evaluator.flow
-        sink = max(float(vertical_speed(polar, way, polar.steepest[way])) for way in (DIVE, CLIMB))
+        sink = fastest_sink(polar, flow)
         away = np.hypot(*(points[:, :2] - self.goal[:2]).T)
         across = away / (float(polar.best_horizontal.max()) + flow.extent.max_speed)
         least = np.maximum(across, np.abs(points[:, 2] - self.goal[2]) / sink)

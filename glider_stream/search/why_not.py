@@ -14,7 +14,7 @@ import numpy as np
 from ..base.arrays import Array, Bools, Index
 from ..base.clock import moment
 from ..kernels.edges import Status
-from ..kernels.flow import velocities
+from ..kernels.flow import max_rise, velocities
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
 
@@ -31,6 +31,7 @@ WORDS = {
     Status.BLOCKED: "blocked by land, seabed or a keep-out area",
     Status.OUTSIDE_FLOW: "outside the current's grid",
     Status.SAME_DEPTH: "between nodes of one depth",
+    Status.CARRIED_AWAY: "the water rises or sinks faster than any glide against it",
     Status.CONNECTED: "can be flown, but the roadmap does not hold them, or a rule of surfacings forbids them",
 }
 ADVICE = {
@@ -50,6 +51,7 @@ CAUSES = {
     Status.OUTSIDE_FLOW: "outside",
     Status.CONNECTED: "not held",
     Status.SAME_DEPTH: "depth",
+    Status.CARRIED_AWAY: "current",
 }
 
 
@@ -229,7 +231,8 @@ def reach_of(problem: Problem) -> tuple[float, float]:
     evaluator = problem.evaluator
     polar, horizon = evaluator.polar, evaluator.integration.dt * evaluator.integration.steps
     across = (float(polar.best_horizontal.max()) + float(evaluator.flow.extent.max_speed)) * horizon
-    down = float((polar.speed[:, -1] * np.sin(polar.steepest)).max()) * horizon
+    fastest = float((polar.speed[:, -1] * np.sin(polar.steepest)).max()) + max_rise(evaluator.flow)
+    down = fastest * horizon
     return across, down
 
 

@@ -311,6 +311,142 @@ class TidalJet(AnalyticFlow):
         }
 
 
+@dataclass(frozen=True)
+class Upwelling(AnalyticFlow):
+    """A current with a vertical part: u, v and w [m/s, upward] at z = 0 and x = `x_centre`, the same everywhere.
+
+    With `stretch` [1/s] the water is stretched along z and squeezed along x: u - stretch (x - x_centre) and
+    w + stretch z, free of divergence; then the box's `x` must be given.
+    """
+
+    u: float
+    v: float
+    w: float
+    stretch: float = 0.0
+    x_centre: float = 0.0
+
+    def check(self) -> None:
+        """Raise InputError if the flow stretches and has no sides."""
+        bounded = self.stretch == 0 or self.x is not None
+        require(
+            bounded, "`flow.x` must be given where `flow.stretch` is not 0: the speed grows with the distance"
+        )
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """Return the kernel's class and its fields."""
+        ends = (0.0, 0.0) if self.x is None else self.x
+        fastest = max(abs(self.u - self.stretch * (end - self.x_centre)) for end in ends)
+        heights = -(depth[1] + BEYOND), -(depth[0] - BEYOND)
+        return kernel.Upwelling, {
+            "u": self.u,
+            "v": self.v,
+            "w": self.w,
+            "x": self.x_centre,
+            "stretch": self.stretch,
+            "max_rise": max(abs(self.w + self.stretch * z) for z in heights),
+            "max_speed": math.hypot(fastest, self.v),
+            "length_scale": math.inf if self.stretch == 0 else (ends[1] - ends[0]) / 8,
+        }
+
+
+@dataclass(frozen=True)
+class Rolls(AnalyticFlow):
+    """A row of convection cells: w = -w_max cos(pi (x - x_centre) / width) sin(pi z / depth), u by continuity.
+
+    The water rises and sinks by turns every `width` [m]; `depth` [m] is that of the cells. `w` [m/s] is the
+    greatest vertical speed, upward at `x_centre`. u is at most w width / depth, at the surface and at the bottom.
+    """
+
+    w: float
+    width: float
+    depth: float
+    x_centre: float = 0.0
+
+    def check(self) -> None:
+        """Raise InputError unless width and depth are positive."""
+        require_positive(self.width, "flow.width")
+        require_positive(self.depth, "flow.depth")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """Return the kernel's class and its fields."""
+        return _rolls(self.w, self.width, self.depth, self.x_centre, 0.0)
+
+
+@dataclass(frozen=True)
+class InternalWave(AnalyticFlow):
+    """An internal wave that travels along x: w = -w_max cos(2 pi (dx / length - t / period)) sin(m z).
+
+    dx = x - x_centre; m = pi mode / depth: at the surface and at `depth` [m] there is no vertical current. u and
+    w come from one stream function in the vertical plane, so the wave is free of divergence. `w` [m/s] is the
+    greatest vertical speed; the wave moves towards +x by its `length` [m] in a `period` [s]. u is at most
+    w mode length / (2 depth).
+    """
+
+    w: float
+    length: float
+    depth: float
+    period: float
+    mode: int = 1
+    x_centre: float = 0.0
+
+    def check(self) -> None:
+        """Raise InputError unless length, depth, period and mode are positive."""
+        for name in ("length", "depth", "period"):
+            require_positive(getattr(self, name), f"flow.{name}")
+        require(self.mode >= 1, f"`flow.mode` must be at least 1; got {self.mode}")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """Return the kernel's class and its fields."""
+        drift = self.length / self.period
+        return _rolls(self.w, self.length / 2, self.depth / self.mode, self.x_centre, drift)
+
+
+def _rolls(w: float, width: float, depth: float, x: float, drift: float) -> tuple[type, dict[str, Any]]:
+    """Return cells of a width and a depth [m] that move along x at `drift` [m/s], as the kernels read them."""
+    return kernel.Rolls, {
+        "x": x,
+        "w": w,
+        "across": math.pi / width,
+        "down": math.pi / depth,
+        "drift": drift,
+        "max_rise": abs(w),
+        "max_speed": abs(w) * width / depth,
+        "length_scale": min(width, depth) / 2,
+    }
+
+
+@dataclass(frozen=True)
+class Abc(AnalyticFlow):
+    """The flow of Arnold, Beltrami and Childress, whose paths are chaotic: a hard test.
+
+    u = a sin(kz) + c cos(ky), v = b sin(kx) + a cos(kz), w = c sin(ky) + b cos(kx); k = 2 pi / length.
+
+    `a`, `b`, `c` [m/s], `length` [m].
+    """
+
+    a: float
+    b: float
+    c: float
+    length: float
+
+    def check(self) -> None:
+        """Raise InputError unless the length is positive."""
+        require_positive(self.length, "flow.length")
+
+    def fields(self, depth: Range) -> tuple[type, dict[str, Any]]:
+        """Return the kernel's class and its fields."""
+        a, b, c = abs(self.a), abs(self.b), abs(self.c)
+        return kernel.Abc, {
+            "a": self.a,
+            "b": self.b,
+            "c": self.c,
+            "number": 2 * math.pi / self.length,
+            "max_rise": b + c,
+            "max_speed": math.hypot(a + c, b + a),
+            "length_scale": self.length / 8,
+        }
+
+
 FLOWS: dict[str, type[AnalyticFlow]] = {
     "uniform": Uniform,
     "vortices": Vortices,
@@ -319,4 +455,8 @@ FLOWS: dict[str, type[AnalyticFlow]] = {
     "rankine": Rankine,
     "jet": Jet,
     "tidal-jet": TidalJet,
+    "upwelling": Upwelling,
+    "convection-cells": Rolls,
+    "internal-wave": InternalWave,
+    "abc": Abc,
 }

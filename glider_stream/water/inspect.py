@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from ..base.checks import Range
+from ..base.settings import require
 from ..kernels import flow as kernel
 from ..kernels.terrain import Terrain
 
@@ -13,6 +14,15 @@ from ..kernels.terrain import Terrain
 def is_steady(flow: kernel.Flow) -> bool:
     """Whether the flow is the same at all times."""
     return kernel.cycle(flow) == 0
+
+
+def require_level(flow: kernel.Flow, what: str) -> None:
+    """Raise InputError if a flow has a vertical part; `what` cannot take it, and begins the sentence."""
+    require(
+        not kernel.rises(flow),
+        f"{what} takes no vertical current, and this flow has one, up to {kernel.max_rise(flow):.3g} m/s; "
+        "choose a flow without it",
+    )
 
 
 def flow_sha256(flow: kernel.Flow | Terrain) -> str:

@@ -20,7 +20,7 @@ MAX_SAMPLES = 100_000_000
 
 def sample_flow(
     flow: kernel.Flow, spacing: tuple[float, float, float], x: Range, y: Range, z: Range
-) -> kernel.Grid:
+) -> kernel.Grid | kernel.RisingGrid:
     """Return the flow on an even grid over a box [m], interpolated trilinearly.
 
     `spacing` [m] is the largest spacing along x, y and z.
@@ -36,27 +36,30 @@ def sample_flow(
     )
     counts = [max(2, math.ceil(n - 1e-9)) for n in points]
     lines = [np.linspace(lo, hi, n) for (lo, hi), n in zip(box, counts, strict=True)]
-    values = np.empty((counts[2], counts[0], counts[1], 2))
-    in_parallel(partial(kernel.sample_lines, flow, *lines, 0.0, values), counts[2] * counts[0], LINES_AT_ONCE)
+    rises = kernel.rises(flow)
+    values = np.empty((counts[2], counts[0], counts[1], 4 if rises else 2))
+    sample = kernel.sample_rising_lines if rises else kernel.sample_lines
+    in_parallel(partial(sample, flow, *lines, 0.0, values), counts[2] * counts[0], LINES_AT_ONCE)
     steps = [(hi - lo) / (n - 1) for (lo, hi), n in zip(box, counts, strict=True)]
     scale = known.length_scale
     level_speed = np.array([np.hypot(level[..., 0], level[..., 1]).max() for level in values])
+    extent = kernel.Extent(
+        *box[0],
+        *box[1],
+        known.t_lo,
+        known.t_hi,
+        max_speed=float(level_speed.max()),
+        length_scale=max(scale / 2, steps[0], steps[1]) if math.isfinite(scale) else steps[0],
+    )
+    spaced = {"per_x": 1 / steps[0], "per_y": 1 / steps[1], "z_first": z[0], "per_z": 1 / steps[2]}
+    if rises:
+        return kernel.RisingGrid(values, **spaced, max_rise=float(np.abs(values[..., 2]).max()), extent=extent)
     return kernel.Grid(
         values=values,
         level_speed=level_speed,
         level_carry=np.concatenate([[0.0], np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 * steps[2])]),
-        per_x=1 / steps[0],
-        per_y=1 / steps[1],
-        z_first=z[0],
-        per_z=1 / steps[2],
-        extent=kernel.Extent(
-            *box[0],
-            *box[1],
-            known.t_lo,
-            known.t_hi,
-            max_speed=float(level_speed.max()),
-            length_scale=max(scale / 2, steps[0], steps[1]) if math.isfinite(scale) else steps[0],
-        ),
+        **spaced,
+        extent=extent,
     )
 
 
@@ -65,5 +68,6 @@ def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, 
     lo, hi = np.array([x, y, z]).T
     px, py, pz = (lo + np.random.default_rng(0).random((4096, 3)) * (hi - lo)).T.copy()
     now = np.zeros(px.size)
-    off = kernel.velocities(flow, px, py, pz, now) - kernel.velocities(sampled, px, py, pz, now)
-    return float(np.hypot(off[:, 0], off[:, 1]).max())
+    read = kernel.currents if kernel.rises(flow) else kernel.velocities
+    off = read(flow, px, py, pz, now) - read(sampled, px, py, pz, now)
+    return float(np.linalg.norm(off, axis=1).max())

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from glider_stream.kernels.cache import entry_point
 from glider_stream.kernels.control import candidate_controls, control_towards, direction_of, vertical_speed
-from glider_stream.kernels.flow import contains, velocity
+from glider_stream.kernels.flow import contains, current, velocity
 from glider_stream.kernels.place import Pair, Place
 
 CONNECTED, TIME, COST, ANGLE, HEADING, SPEED, MISS = range(7)
@@ -111,6 +111,26 @@ def replay(flow, start, through_water, horizon, t=0.0):
         max_step=horizon / 50,
         dense_output=True,
     ).sol
+
+
+def replay_rising(flow, start, through_water, height, horizon):
+    """Where and when a path in a rising flow first reaches a height, by DOP853 with events: x, y, z, t.
+
+    `start` is x, y, z [m] and a departure [s].
+    """
+    *begin, t = start
+
+    def rate(s, at):
+        return np.add(current(flow, *at, t + s), through_water)
+
+    def arrives(s, at):
+        return at[2] - height
+
+    arrives.terminal = True
+    path = solve_ivp(
+        rate, (0.0, horizon), begin, method="DOP853", rtol=1e-12, atol=1e-10, max_step=5.0, events=arrives
+    )
+    return *path.y_events[0][0], path.t_events[0][0]
 
 
 def closest_on(path, goal, horizon):

@@ -10,6 +10,7 @@ import glider_stream
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.opened import open_scenario
+from glider_stream.opened.replanning import at_fix
 from glider_stream.pilot.currents import dive_currents
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
@@ -138,5 +139,5 @@ def test_currents_that_have_changed_do_not_matter_where_newer_ones_are_named(pla
     turned = open_scenario(scenario_from_text(SCENARIO.replace("speed = 0.4", "speed = -0.4")))
     old = load_path(plan)
     with pytest.raises(InputError, match="the currents have changed since"):
-        turned._at_fix(old, 200.0, renewed=False)
-    assert turned._at_fix(old, 200.0, renewed=True)[1] == 200.0
+        at_fix(turned.searches, old, 200.0, renewed=False)
+    assert at_fix(turned.searches, old, 200.0, renewed=True)[1] == 200.0

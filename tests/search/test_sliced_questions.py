@@ -93,7 +93,7 @@ def test_in_a_steady_current_any_departure_is_alike():
     road = glider_stream.open(small_roadmap())
     assert road.query(depart=77).travel_time == road.query().travel_time
     when = datetime(2024, 10, 29, tzinfo=UTC)
-    road._kept["problem"] = replace(road.problem, departs=when)
+    road.searches._kept["problem"] = replace(road.problem, departs=when)
     assert road.query(depart="2024-10-29T06:00").departs == when + timedelta(hours=6)
 
 
@@ -120,7 +120,7 @@ def test_what_was_found_scores_thins_and_fits_its_card(road, tmp_path):
 def test_the_card_reads_the_current_of_the_time_at_which_a_leg_passes(road):
     here, elsewhere = glider_stream.open(sliced()), replace(problem(), departure=1200.0)
     path = road.query(depart=370)
-    here._kept["problem"] = elsewhere
+    here.searches._kept["problem"] = elsewhere
     assert [row.along for row in here.card(path).legs] == [row.along for row in road.card(path).legs]
 
 
@@ -137,7 +137,7 @@ def test_when_to_leave_asks_the_slices(file, capsys):
 def test_a_figure_of_it_shows_one_slice_over_the_current_of_its_time(road, monkeypatch):
     drawn = []
     monkeypatch.setattr("glider_stream.plot.draw.draw_roadmap", lambda *what: drawn.append(what))
-    road._kept["problem"] = replace(problem(), departure=700.0)
+    road.searches._kept["problem"] = replace(problem(), departure=700.0)
     road.plot()
     slice_drawn, at, *_, title = drawn[0]
     assert slice_drawn.target.size == sliced().at(1).target.size

@@ -13,7 +13,6 @@ from ...base.settings import require
 from ...kernels.flow import Extent, OceanGrid, velocities
 from ...kernels.terrain import Seabed, allowed
 from ..frame import MAX_SCALE_ERROR, LocalFrame
-from .bottom import Bottom
 from .file import OceanFile, Times, parse_time
 from .grid import EVEN, Grid, IndexMap, gaps, index_map, span, unbroken
 from .levels import no_such_levels
@@ -236,21 +235,13 @@ def ocean_flow(
     needs. The bottom at a place is the bottom of the nearest column: `OceanFile.seabed`, or where its data end.
     The current of the top level is held above it; a file without depths is held at all depths.
     """
-    return _ocean_flow(file, frame, lon, lat, depth, epoch)[:2]
+    return ocean_grounds(file, frame, lon, lat, depth, epoch)[:2]
 
 
-def ocean_waters(
+def ocean_grounds(
     file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None = None
-) -> tuple[OceanGrid, Bottom]:
-    """Return the flow of a domain (see `ocean_flow`) and the bottom on the file's own grid."""
-    flow, seabed, grid = _ocean_flow(file, frame, lon, lat, depth, epoch)
-    # the file's assumptions name what was taken for the bottom
-    return flow, Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own file", seabed.ground.T)
-
-
-def _ocean_flow(
-    file: OceanFile, frame: LocalFrame, lon: Range, lat: Range, depth: Range, epoch: str | None
 ) -> tuple[OceanGrid, Seabed, Grid]:
+    """Return the flow and the seabed of a domain (see `ocean_flow`), and their part of the file's grid."""
     require(0 <= depth[0] <= depth[1], f"the domain's depth must rise from 0 or below; got {list(depth)}")
     flow, seabed, grid = _build(file, frame, lon, lat, depth, epoch)
     error = frame.scale_error(lon, lat)

@@ -67,6 +67,7 @@ AXIS_NAMES = {
     "depth": {"depth", "depths", "deptht", "depthu", "depthv", "z", "st_ocean", "z_t", "lev", "level_depth"},
     "time": {"time", "times", "mt", "ocean_time", "time_counter", "date_time", "valid_time"},
 }
+AXIS_NAMES["depth"] |= {"depthw"}
 AXIS_NAMES["lon"] |= {"glamt", "glamu", "glamv", "glamf", "geolon", "geolon_c", "geolon_t", "geolon_u"}
 AXIS_NAMES["lon"] |= {
     "geolon_v",

@@ -1,5 +1,6 @@
 """Reads ocean current files. It returns right values, or one sentence with what is missing and the cure."""
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -9,14 +10,16 @@ from typing import Any
 import numpy as np
 
 from ...base.checks import Range
+from ...base.errors import InputError
 from ...base.settings import from_table, require
 from .component import Component, Domain
 from .file import OceanFile, parse_time
 from .ground import model_depth
 from .joining import joined
-from .names import Catalogue, Names, listing
+from .names import Catalogue, Names, listing, standard_name
 from .opening import opened
 from .part import Part
+from .vertical import CONTINUITY
 
 LIMIT = 2e9
 """The currents of a domain may take at most this much memory [bytes]; a point takes two float64."""
@@ -58,6 +61,53 @@ def read_currents(
     return joined(paths, parts, given)
 
 
+VERTICAL_WORDS = re.compile(r"\b(upward|vertical).*(velocity|current|speed)|\bw.?(velocity|component)\b")
+NO_WATER = re.compile(r"\bair\b|wind|\bice\b")
+VERTICAL_NAMES = {"w", "wo", "vovecrtz", "wvel"}
+"""How a vertical current is told: by its long name, unless it is of air or ice, or by its name."""
+
+
+def vertical_of(files: Sequence[str], names: Names, name: str, upward: bool | None) -> float:
+    """Return 1 if the variable of a vertical current counts upward, -1 if downward.
+
+    InputError if no file holds it, or if neither the file nor the user says which.
+    """
+    held: list[str] = []
+    for path in map(Path, files):
+        with opened(path, names.group) as data:
+            held += map(str, data.variables)
+            if name not in data.variables:
+                continue
+            words = f"{standard_name(data[name])} {data[name].attrs.get('long_name', '')}".lower()
+            ways = [way for way, word in ((1.0, "upward"), (-1.0, "downward")) if word in words]
+            way = ways[0] if upward is None and len(ways) == 1 else None
+            if upward is not None:
+                way = 1.0 if upward else -1.0
+            if way is None:
+                raise InputError(
+                    f"`{name}` of {path.name} does not say whether it counts upward; set `flow.upward`"
+                )
+            return way
+    raise InputError(
+        f"`flow.vertical` names a variable of the files, and none holds `{name}`; name another, "
+        f'or "{CONTINUITY}"; they hold: {listing(held)}'
+    )
+
+
+def _vertical_note(at: Catalogue) -> tuple[str, ...]:
+    """Return a note on a vertical current that a file holds."""
+    for name, variable in at.data.data_vars.items():
+        standard, long = standard_name(variable), str(variable.attrs.get("long_name", "")).lower()
+        named = str(name).lower() in VERTICAL_NAMES or standard == "upward_sea_water_velocity"
+        if (
+            variable.ndim >= 3
+            and (named or VERTICAL_WORDS.search(long))
+            and not NO_WATER.search(f"{standard} {long}")
+        ):
+            return (f"`{name}` may be a vertical current: it is read if `flow.vertical` names it",)
+    return ()
+
+
 def _with_currents(paths: list[Path], names: Names) -> list[Path]:
     """Return the files that hold currents, if there are several; InputError if no file holds a named variable."""
     held: dict[str, Sequence[str]] = {}
@@ -96,7 +146,8 @@ def _parts(at: Catalogue, domain: Domain | None, room: float, whole_depth: bool)
         raise at.refuse()
     result: list[Part] = []
     for component, (variable, how) in found.items():
-        result.append(Component(at, component, variable, how).part(domain, room, whole_depth))
+        part = Component(at, component, variable, how).part(domain, room, whole_depth)
+        result.append(replace(part, notes=(*part.notes, *_vertical_note(at))))
         room -= 8.0 * result[-1].values.size
     return result
 

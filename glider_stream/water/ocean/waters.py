@@ -4,12 +4,13 @@ from dataclasses import dataclass, field, replace
 
 from ...base.checks import Range
 from ...base.settings import require
-from ...kernels.flow import OceanGrid
+from ...kernels.flow import OceanGrid, RisingOceanGrid
 from ..frame import LocalFrame
 from .bottom import Bottom
-from .flow import ocean_waters
+from .flow import ocean_grounds
 from .names import Names
-from .reader import read_currents
+from .reader import read_currents, vertical_of
+from .vertical import CONTINUITY, by_continuity, by_variable
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,9 @@ class OceanFlow:
 
     `names`: needed where the file's own names are not enough. `member`: which member of an ensemble, by its
     label, or by its number from 0 without labels; the same as `names.member`.
+    `vertical`: the name of the variable with the vertical current, on its own levels, or "continuity": from u
+    and v. Without it there is none, though the files may hold one. `upward` says whether that variable counts
+    upward, where it does not say so itself.
     """
 
     file: tuple[str, ...] = field(
@@ -26,6 +30,8 @@ class OceanFlow:
     epoch: str | None = None
     names: Names | None = None
     member: int | str | None = None
+    vertical: str | None = None
+    upward: bool | None = None
 
     def __post_init__(self) -> None:
         named = None if self.names is None else self.names.member
@@ -33,18 +39,37 @@ class OceanFlow:
             self.member is None or named is None or str(named) == str(self.member),
             f"`flow.member` = {self.member!r} and `flow.names.member` = {named!r} differ; leave one of them out",
         )
+        why = "`flow.upward` is for a `flow.vertical` that is a variable's name; leave it out"
+        require(self.upward is None or self.vertical not in (None, CONTINUITY), why)
 
-    def waters(self, frame: LocalFrame, lon: Range, lat: Range, depth: Range) -> tuple[OceanGrid, Bottom, str]:
+    def waters(
+        self, frame: LocalFrame, lon: Range, lat: Range, depth: Range
+    ) -> tuple[OceanGrid | RisingOceanGrid, Bottom, str]:
         """Return the flow and the bottom of a domain, and a text on their source."""
         names = self.names or Names()
         if self.member is not None:
             names = replace(names, member=self.member)
         file = read_currents(self.file, names, lon=lon, lat=lat, depth=depth)
-        flow, bottom = ocean_waters(file, frame, lon, lat, depth, self.epoch)
+        box = frame, lon, lat, depth, self.epoch
+        flow, seabed, grid = ocean_grounds(file, *box)
+        result: OceanGrid | RisingOceanGrid = flow
+        rising = []
+        if self.vertical == CONTINUITY:
+            result, told = by_continuity(flow, seabed, frame, grid, file.name)
+            rising = [told]
+        elif self.vertical is not None:
+            way = vertical_of(self.file, names, self.vertical, self.upward)
+            own = replace(names, u=self.vertical, v=self.vertical, rotate="none")
+            upward, _, points = ocean_grounds(read_currents(self.file, own, lon=lon, lat=lat, depth=depth), *box)
+            result, told = by_variable(flow, upward, way, frame, (grid, points), self.vertical)
+            rising = [told]
         source = [
             f"{file.took['u']}, {file.took['v']} of {file.name}",
             file.time_range,
             *file.assumptions,
-            *file.notes,
+            *(note for note in file.notes if not rising or "flow.vertical" not in note),
+            *rising,
         ]
-        return flow, bottom, "; ".join(source)
+        # the file's assumptions name what was taken for the bottom
+        where = Bottom(grid, seabed.bottom.T, False, "bottom by the currents' own file", seabed.ground.T)
+        return result, where, "; ".join(source)

@@ -1,0 +1,199 @@
+"""Plans made anew from a fix."""
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path as File
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.clock import moment
+from ..base.settings import require
+from ..pilot.replan import Replan, compared, good_until_of, shown
+from ..pilot.slocum import RADIUS
+from ..roadmap.problem import Problem
+from ..roadmap.roadmap import Roadmap
+from ..roadmap.slices import SlicedRoadmap
+from ..scenario import with_currents
+from ..search.assembly import RoutePlanner
+from ..search.departures import Moment, seconds
+from ..search.flown_on import check_currents, check_plan, flown_on
+from ..search.path import SURFACE, Path, load_path, placed
+from ..search.query import Planner
+from ..search.surfacing import Surfacing
+from ..search.time_dependent import ClockPlanner
+from ..water.domain import GeographicDomain, domain_from_table
+from .routes import routed
+from .searches import Nodes, Searches
+
+LATEST_FIX = 366 * 86_400.0
+"""A fix is at most so long [s] after its plan's departure; seconds since 1970, say, are not the flow's."""
+NEAR = 0.1
+"""A replan with the clock running searches the nodes on ways at most this share longer than the best way, by the
+legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands."""
+
+
+class Fix(NamedTuple):
+    """Where and when a vehicle surfaced."""
+
+    place: Array
+    """(3,) [m]."""
+    since: float
+    """[s] since the departure of the old plan."""
+    before: Problem
+    """The old plan's water, for gliders that leave at the fix."""
+    leaves: Problem
+    """The new plan's water, for gliders that leave at the fix."""
+
+
+def replanned(
+    searches: Searches,
+    path: str | File | Path,
+    fix: tuple[float, float],
+    time: Moment,
+    *,
+    dac: tuple[float, float] | None,
+    currents: str | File | Sequence[str | File] | None,
+    tolerance: float,
+    surfacing: Surfacing | None,
+    arrival_radius: float | None,
+    all_nodes: bool,
+    **options: Any,
+) -> Replan:
+    """Return a new plan from a position fix to the goal of an old plan; see `OpenedScenario.replan`."""
+    old = path if isinstance(path, Path) else load_path(path)
+    require(len(old.legs) > 0, "the plan holds no leg, so nothing is left to be planned anew; plan a route first")
+    require(0 <= tolerance < np.inf, f"the tolerance must be from 0 % up; got {tolerance:.0%}")
+    # a newer forecast is often written over the older one, whose currents are then no more known
+    before, since = at_fix(searches, old, time, renewed=currents is not None and old.origin is not None)
+    place = searches.point((*fix, 0.0))
+    now = searches if currents is None else _renewed(searches, currents, before, place, old.goal)
+    leaves = before if currents is None else now.problem
+    check_moment(leaves, "fix", "name newer currents with --currents")
+    leaves.check_point(place, "fix")
+    radius = _radius(searches, old.goal, arrival_radius)
+    if arrival_radius is not None:
+        options["arrival_radius"] = arrival_radius
+    arrived = float(np.linalg.norm(place - old.goal)) <= radius
+    planner = now.leaving(leaves.departure, _rule_of(old) if surfacing is None else surfacing)
+    new, planner, notes = _anew(now, planner, (place, place if arrived else old.goal), all_nodes, options)
+    old = placed(old, before.leaving(-since))
+    flown = flown_on(old, since, place, leaves)
+    current = None
+    if dac is not None:
+        current = compared(np.array(dac), old, since, place, (leaves, before), new, tolerance)
+    good = None if arrived else good_until_of(flown, new, planner, radius, tolerance)
+    return Replan(new, old, since, place, flown, good, current, radius, arrived, leaves, notes)
+
+
+def _anew(
+    searches: Searches, planner: RoutePlanner, ends: tuple[Array, Array], all_nodes: bool, options: dict[str, Any]
+) -> tuple[Path, RoutePlanner, tuple[str, ...]]:
+    """Return a new route, its planner and notes: among the nodes near the best ways, else among all."""
+    near, share = (planner, 1.0) if all_nodes else _near_ways(searches, planner, *ends)
+    if share < 1:
+        new = routed(searches, near, ends, **options)
+        if new.found:
+            nodes = f"{share:.0%} of the nodes, those on ways of the roadmap's legs at most {NEAR:.0%}"
+            cure = "--all-nodes searches all, which takes longer"
+            return new, near, (*new.notes, f"searched among {nodes} longer than their best; {cure}")
+    new = routed(searches, planner, ends, **options)
+    return new, planner, new.notes
+
+
+def _near_ways(
+    searches: Searches, planner: RoutePlanner, start: Array, goal: Array
+) -> tuple[RoutePlanner, float]:
+    """Return the planner among the nodes near the best ways by the legs of a roadmap, and their share.
+
+    It is the same planner, and 1, if its legs are known, or if no roadmap has legs of one departure.
+    """
+    guide = searches.guide
+    if type(planner) is not ClockPlanner or guide is None:
+        return planner, 1.0
+    road, legs_of = guide.road, guide.problem
+    assert road is not None
+    by_legs = guide.once("guide", Planner, lambda: Planner(_one_slice(road), legs_of))
+    through = by_legs.arrivals(start) + by_legs.remaining(goal)
+    best = float(through.min(initial=np.inf))
+    if not np.isfinite(best):
+        return planner, 1.0
+    near = through <= (1 + NEAR) * best
+    nodes = np.ascontiguousarray(planner.position[near])
+    return ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen), float(near.mean())
+
+
+def at_fix(searches: Searches, old: Path, time: Moment, renewed: bool) -> tuple[Problem, float]:
+    """Return the problem for gliders that leave at a fix, and the time [s] since the departure of an old
+    plan.
+
+    InputError if the plan is not one of this problem, or if the fix is before its departure. `renewed`: the
+    currents of the plan may have changed since.
+    """
+    problem = searches.problem
+    if old.origin is not None:
+        same = domain_from_table(tomllib.loads(old.origin.scenario).get("domain", {})) == searches.scenario.domain
+        require(same, "the plan was made in another [domain], so its places are others; give its own scenario")
+    began = problem.departure if old.departure is None else old.departure
+    began = began if old.origin is None else old.origin.departure
+    leaving = problem.leaving(began - problem.departure)
+    check_plan(old, leaving)
+    if not renewed:
+        check_moment(leaving, "the plan's departure", "give the currents that it was planned with")
+        check_currents(old, leaving)
+    since = seconds(time, problem, "fix") - began
+    if since < 0:
+        left = f"{began:,.0f} s" if leaving.departs is None else moment(leaving.departs, 0.0)
+        require(False, f"the fix's time {time} is before the plan's departure, {left}; give the time of the fix")
+    require(
+        since <= LATEST_FIX,
+        f"the fix's time {time} is {since / 86_400:,.0f} days after the plan's departure, more than "
+        f"{LATEST_FIX / 86_400:g}; give a date, or seconds as the scenario counts them",
+    )
+    return leaving.leaving(since), since
+
+
+def _radius(searches: Searches, goal: Array, arrival_radius: float | None) -> float:
+    """Return the distance [m] at which a goal counts as reached: a list's for places that surface, else a
+    leg's."""
+    if arrival_radius is not None:
+        require(0 <= arrival_radius < np.inf, f"the arrival radius must be 0 m or more; got {arrival_radius:g}")
+        return arrival_radius
+    listed = isinstance(searches.scenario.domain, GeographicDomain) and goal[2] >= -SURFACE
+    return float(RADIUS if listed else searches.problem.evaluator.integration.tolerance)
+
+
+def _renewed(
+    searches: Searches, currents: str | File | Sequence[str | File], before: Problem, start: Array, goal: Array
+) -> Searches:
+    """Return the same scenario and nodes in newer currents, for gliders that leave as in `before`."""
+    files = [currents] if isinstance(currents, str | File) else list(currents)
+    ends = {name: shown(place, before) for name, place in (("start", start), ("goal", goal))}
+    query: dict[str, Any] = {**ends, "departure": before.departure}
+    if before.departs is not None:
+        query |= {"departure": 0.0, "epoch": before.departs.replace(tzinfo=None).isoformat()}
+    nodes = Nodes(searches.position, searches.file, searches.guide)
+    return Searches(with_currents(searches.scenario, files, query), nodes=nodes)
+
+
+def _rule_of(path: Path) -> Surfacing | None:
+    """Return the rule of surfacing that a path was planned with; None if that is unknown."""
+    return None if path.origin is None else Surfacing(path.origin.most_yos, path.origin.most_hours)
+
+
+def check_moment(problem: Problem, what: str, cure: str) -> None:
+    """Raise InputError unless a problem leaves within the times of its flow."""
+    extent, when = problem.evaluator.flow.extent, problem.departure
+    ends = f"{extent.t_lo:,.0f} to {extent.t_hi:,.0f} s"
+    at = f"{when:,.0f} s"
+    if problem.departs is not None and np.isfinite([extent.t_lo, extent.t_hi]).all():
+        ends = " to ".join(moment(problem.departs, end - when) for end in (extent.t_lo, extent.t_hi))
+        at = moment(problem.departs, 0.0)
+    within = extent.t_lo <= when <= extent.t_hi
+    require(within, f"{what}, {at}, lies outside the times of the currents, {ends}; {cure}")
+
+
+def _one_slice(road: Roadmap | SlicedRoadmap) -> Roadmap:
+    """Return a roadmap of one departure, the first of several."""
+    return road.at(0) if isinstance(road, SlicedRoadmap) else road
