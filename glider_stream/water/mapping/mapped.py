@@ -78,9 +78,8 @@ def _far_in_time(moments: Times, measurements: Sequence[Measurements], scale: fl
         off = float(np.abs((np.concatenate(every) - moment) / np.timedelta64(1, "ms")).min()) / 1000.0
         if off >= FAR * scale:
             far = f"{off / 86_400:.3g} days off, {off / scale:.1f} times the scale `time`"
-            notes.append(
-                f"the map of {moment.astype('datetime64[s]')}Z knows hardly anything: its nearest measurement is {far}"
-            )
+            what = f"the map of {moment.astype('datetime64[s]')}Z knows hardly anything"
+            notes.append(f"{what}: its nearest measurement is {far}")
     return notes
 
 
