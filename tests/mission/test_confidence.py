@@ -7,19 +7,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.ionian import write_ionian
 from helpers.missions import EXACT, mission, runner, write_mission
 from helpers.small import command
 
+from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Status
 from glider_stream.kernels.flow import velocities
 from glider_stream.mission.assimilating import corrected
 from glider_stream.mission.confidence.answer import confidence_of
 from glider_stream.mission.confidence.candidates import Search
-from glider_stream.mission.confidence.ensemble import drawn
+from glider_stream.mission.confidence.ensemble import drawn, first_member, from_files
 from glider_stream.mission.confidence.judged import Criterion, Flights, best_of, checked, lost_leg, quantile
 from glider_stream.mission.confidence.reach import reach_of
 from glider_stream.mission.pilot import plan_of
 from glider_stream.mission.run import Runner
+from glider_stream.mission.settings import read_mission
 from glider_stream.mission.vehicle import Vehicle
 from glider_stream.search.path import load_path
 
@@ -247,3 +250,26 @@ def test_a_touch_of_the_ground_is_told(search):
                       np.full(4, 0))  # fmt: skip
     assert flights.terrain.value == 0.5
     assert replace(flights, touched=np.zeros(4, bool)).terrain.value == 0.0
+
+
+def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
+    import xarray as xr
+
+    write_ionian(tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as data:
+        doubled = data.load() * 2.0
+        for name in ("uo", "vo"):
+            doubled[name].attrs = data[name].attrs
+        both = xr.concat([data, doubled], "member")
+        both.to_netcdf(tmp_path / "both.nc", engine="h5netcdf")
+    made = from_files(read_mission("ionian", first_member([tmp_path / "both.nc"])), [tmp_path / "both.nc"])
+    one, two = (problem.evaluator.flow.values for problem in made.each())
+    assert two == pytest.approx(2.0 * one, abs=1e-6)
+    assert made.forecast.evaluator.flow.values == pytest.approx(1.5 * one, abs=1e-6)
+    with pytest.raises(InputError, match=r"a\.nc holds no members: name a file that does, or one file for each"):
+        from_files(read_mission("ionian", first_member([tmp_path / "a.nc"])), [tmp_path / "a.nc"])
+    doubled.isel(depth=[0, 1, 3, 4]).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
+    files = [tmp_path / "a.nc", tmp_path / "less.nc"]
+    read = read_mission("ionian", first_member(files))
+    with pytest.raises(InputError, match="have different points or times, so they have no mean"):
+        from_files(read, files)

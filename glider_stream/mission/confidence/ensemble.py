@@ -115,6 +115,7 @@ def _mean(flows: Sequence[Flow]) -> OceanGrid:
     for n, grid in enumerate(grids):
         alike = grid.values.shape == first.values.shape and np.array_equal(grid.times, first.times)
         alike = alike and np.array_equal(grid.levels, first.levels) and grid.extent[:4] == first.extent[:4]
+        alike = alike and np.array_equal(grid.index_map, first.index_map)
         require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
         total += grid.values
     fastest = max(grid.extent.max_speed for grid in grids)
