@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .evaluation.level_set import Bound
     from .evaluation.suite import Report
     from .mission.campaign import Campaign
+    from .mission.confidence.answer import Confidence
     from .mission.settings import Mission
     from .pilot.currents import DiveCurrents
     from .roadmap.verify import Verification
@@ -856,3 +857,37 @@ def simulate(
     if keep is not None:
         forget(keep)
     return campaign
+
+
+def confidence(
+    mission: "str | File | Mission",
+    routes: Sequence[str | File] = (),
+    *,
+    members: Sequence[str | File] = (),
+    draws: int | None = None,
+    first: int = 0,
+    best: float | str = 0.9,
+    by: float | None = None,
+    replanned: bool = False,
+    reach: bool = False,
+    outputs: Sequence[str | File] = (),
+    figure: str | File | None = None,
+    overrides: Sequence[str] = (),
+) -> "tuple[Confidence, list[str]]":
+    """Return how often and by when routes arrive in an ensemble of currents, and notes on the files written.
+
+    The vehicle and its errors, its steering and calls, and what counts as arrived are those of a mission. The
+    members are those of `members` (one file, or several files), or `draws` of the mission's [forecast_error] from
+    number `first` on. Without `routes` (path files) candidates are searched. `best`: 0.9 for the earliest time by
+    which 90 % arrive, "mean", or "by" for most arrivals `by` a time [s]. `replanned`: candidates are ways to plan
+    anew at each call. `reach`: also where a vehicle can be by then. The chosen route is written to `outputs`.
+
+    Examples:
+        >>> answer, _ = planner.confidence("small-mission.toml", draws=2, best="mean")
+        >>> answer.best.arrived().value
+        1.0
+    """
+    from .confident import answered
+
+    given = (routes, members, draws, first, best, by, replanned, reach, outputs, figure, overrides)
+    return answered(mission, *given)

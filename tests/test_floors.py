@@ -16,12 +16,13 @@ FLOORS = {
     4: "roadmap",
     5: "scenario search jobs",
     6: "plot pilot evaluation mission",
-    7: "opened simulated planner cli __main__",
+    7: "opened simulated confident planner cli __main__",
 }
 FLOOR_OF = {name: floor for floor, names in FLOORS.items() for name in names.split()}
 DOORS = {
     ("planner", "opened"),
     ("planner", "simulated"),
+    ("planner", "confident"),
     ("cli", "planner"),
     ("cli", "opened"),
     ("__main__", "cli"),

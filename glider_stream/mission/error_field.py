@@ -1,7 +1,7 @@
 """The error of a forecast: a random current without divergence, from a random stream function."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -10,6 +10,14 @@ from .settings import ForecastError
 
 WAVES = 96
 """Waves in the sum: so many that it is nearly normal, and its correlation nearly the one that is asked for."""
+
+
+class OnMesh(Protocol):
+    """A current that can be put on a grid."""
+
+    def on_mesh(self, x: Array, y: Array, z: Array, t: Array) -> Array:
+        """Return the current (times, levels, points, 2) [m/s] at places x, y (points,), for all z and t."""
+        ...
 
 
 class ErrorField(NamedTuple):

@@ -1,6 +1,7 @@
 """Pilots: a policy makes orders from a fix and a forecast, once or at each call."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,24 +16,25 @@ from ..search.answer import planner_of
 from ..search.assembly import RoutePlanner
 from ..search.path import Path
 from ..water.inspect import is_steady
+from .assimilating import corrected
 from .depth_averaged import Chart, chart_of
 from .orders import Orders, Waypoints, trims_of, waypoints_of
 from .settings import Mission
-from .vehicle import Fix
+from .vehicle import Dive, Fix
 
 
 class Office:
     """What a pilot plans with in one current: a problem, its planner and chart, each made when it is needed."""
 
-    def __init__(self, problem: Problem, mission: Mission) -> None:
-        """Keep the problem."""
-        self.problem, self.mission = problem, mission
+    def __init__(self, problem: Problem, mission: Mission, road: Roadmap | None = None) -> None:
+        """Keep the problem, and in a steady current its roadmap, if that is known."""
+        self.problem, self.mission, self._road = problem, mission, road
 
     @cached_property
     def planner(self) -> RoutePlanner:
         """The planner of routes that come up as the mission asks; in a steady current it has a roadmap's legs."""
         steady = is_steady(self.problem.evaluator.flow)
-        road: Roadmap | None = build_roadmap(self.problem) if steady else None
+        road = build_roadmap(self.problem) if steady and self._road is None else self._road
         return planner_of(self.problem, road, self.mission.pilot.rule)
 
     @cached_property
@@ -66,6 +68,11 @@ class Office:
         path = (self.planner if steady else self.planner.leaving(since)).query(start, self.goal)
         return path if path.found and path.legs else None
 
+    def after(self, dives: Sequence[Dive]) -> "Office":
+        """Return the office with the forecast corrected by dives; this one if nothing is to correct."""
+        problem = corrected(self.problem, self.mission, dives)
+        return self if problem is self.problem else Office(problem, self.mission)
+
     def towards(self, stops: Array) -> Waypoints:
         """Return the orders to head for places (n, 2) [m] with the deepest yos at the fastest glide."""
         count = len(stops)
@@ -79,6 +86,13 @@ class Plan:
     orders: Orders
     line: Array
     takes: float
+
+
+def plan_of(path: Path, office: Office, steering: str | None = None) -> Plan:
+    """Return a route as orders for a `steering`, the mission's if it is None."""
+    by_trims = (steering or office.mission.vehicle.steering) == "trims"
+    orders = trims_of(path) if by_trims else waypoints_of(path, office.angle)
+    return Plan(orders, path.trajectory[:, 1:3], path.travel_time)
 
 
 class Policy(ABC):
@@ -98,11 +112,15 @@ class Replan(Policy):
     def plan(self, office: Office, fix: Fix) -> Plan | None:
         """Return the best route from a fix."""
         path = office.route(fix)
-        if path is None:
-            return None
-        by_trims = office.mission.vehicle.steering == "trims"
-        orders = trims_of(path) if by_trims else waypoints_of(path, office.angle)
-        return Plan(orders, path.trajectory[:, 1:3], path.travel_time)
+        return None if path is None else plan_of(path, office)
+
+
+class Assimilate(Replan):
+    """The fastest route in the forecast corrected by the currents of all dives so far, again at each call."""
+
+    def plan(self, office: Office, fix: Fix) -> Plan | None:
+        """Return the best route from a fix in the corrected forecast."""
+        return super().plan(office.after(fix.dives), fix)
 
 
 class OpenLoop(Replan):
@@ -142,6 +160,7 @@ class DepthAveraged(Policy):
 POLICIES: dict[str, type[Policy]] = {
     "open-loop": OpenLoop,
     "replan": Replan,
+    "assimilate": Assimilate,
     "straight": Straight,
     "depth-averaged": DepthAveraged,
     "omniscient": Omniscient,

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..kernels.place import Place
+from ..roadmap.problem import Problem
 from .orders import Orders, Trims
 from .pilot import POLICIES, Office, Plan, Policy
 from .settings import Mission
@@ -49,11 +50,15 @@ class Outcome:
 
 @dataclass
 class Flight:
-    """A run in all its parts: its `outcome`, its `phases`, and its plans, each with its time [s]."""
+    """A run in all its parts: its `outcome`, its `phases`, and its plans, each with its time [s].
+
+    `touched`: dives that the seabed's clearance has cut short.
+    """
 
     outcome: Outcome
     phases: list[Phase]
     plans: list[tuple[float, Plan]] = field(default_factory=list)
+    touched: int = 0
 
 
 class Runner:
@@ -87,18 +92,23 @@ class Runner:
 
     def flight(self, name: str, number: int, forecast: Office) -> Flight:
         """Return one run of a policy."""
-        policy, true, mission = POLICIES[name](), self.worlds.true, self.mission
-        office = self._true if policy.knows else forecast
-        assert true.start is not None
-        vehicle = Vehicle(
-            true,
-            mission.vehicle,
-            mission.pilot.rule,
-            mission.energy,
-            np.random.default_rng(seeds_of(mission, number)[1]),
-            Place(float(true.start[0]), float(true.start[1]), float(true.start[2]), true.departure),
-        )
-        return _Run(vehicle, policy, office, mission).fly(name, number)
+        policy, true = POLICIES[name](), self.worlds.true
+        return fly(true, policy, self._true if policy.knows else forecast, name, number)
+
+
+def fly(true: Problem, policy: Policy, office: Office, name: str, number: int) -> Flight:
+    """Return a flight in the `true` current, of a policy that plans in an office; `number` sets its errors."""
+    mission = office.mission
+    assert true.start is not None
+    vehicle = Vehicle(
+        true,
+        mission.vehicle,
+        mission.pilot.rule,
+        mission.energy,
+        np.random.default_rng(seeds_of(mission, number)[1]),
+        Place(float(true.start[0]), float(true.start[1]), float(true.start[2]), true.departure),
+    )
+    return _Run(vehicle, policy, office, mission).fly(name, number)
 
 
 class _Run:
@@ -129,7 +139,8 @@ class _Run:
             np.concatenate(track) - [departure, 0.0, 0.0, 0.0],
             self.plans[0][1].line if self.plans else np.empty((0, 2)),
         )
-        return Flight(outcome, vehicle.phases, [(t - departure, plan) for t, plan in self.plans])
+        plans = [(t - departure, plan) for t, plan in self.plans]
+        return Flight(outcome, vehicle.phases, plans, vehicle.touched)
 
     def _off(self) -> float:
         return math.dist(self.vehicle.here[:2], self.office.goal[:2])

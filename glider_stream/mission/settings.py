@@ -24,7 +24,7 @@ from ..scenario import (
 from ..search.surfacing import Surfacing
 from ..vehicle.cost import Energy, energy_from_table
 
-POLICIES = ("open-loop", "replan", "straight", "depth-averaged", "omniscient")
+POLICIES = ("open-loop", "replan", "assimilate", "straight", "depth-averaged", "omniscient")
 """The names of the policies; `pilot` has a class for each."""
 MOST_DEGREES = 180.0
 MOST_SHARE = 10.0
@@ -253,6 +253,10 @@ def mission_from_table(table: Mapping[str, Any], path: Path, overrides: Sequence
     error = None
     if "forecast_error" in table:
         error = from_table(ForecastError, table["forecast_error"], "forecast_error")
+    pilot = from_table(PilotSettings, table["pilot"], "pilot")
+    told = error is not None or "assimilate" not in pilot.policies
+    why = "the policy `assimilate` needs [forecast_error], which says how far errors reach; got [truth]"
+    require(told, f"{why}; leave it out of `pilot.policies`")
     kept = {name: dict(table[name]) for name in SECTIONS_OF_MISSION if name in table and name != "scenario"}
     if truth is not None:
         kept["truth"] = tomllib.loads(truth.text)["flow"]
@@ -261,7 +265,7 @@ def mission_from_table(table: Mapping[str, Any], path: Path, overrides: Sequence
         truth=truth,
         forecast_error=error,
         vehicle=vehicle,
-        pilot=from_table(PilotSettings, table["pilot"], "pilot"),
+        pilot=pilot,
         arrival=arrival,
         energy=from_table(Energy, energy_from_table(dict(table["energy"])), "energy"),
         random=from_table(Random, table["random"], "random"),

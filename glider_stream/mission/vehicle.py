@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,17 +35,36 @@ class Phase:
     speed: float
 
 
+class Dive(NamedTuple):
+    """What the vehicle has measured between two surfacings.
+
+    `start`, `end`: fixes x, y [m]; `begins`, `ends` [s]; `depth`: the deepest place [m, downward]; `yos`; the
+    mean `current` [m/s]; `through`: its mean horizontal speed through water by dead reckoning [m/s].
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    begins: float
+    ends: float
+    depth: float
+    yos: int
+    current: tuple[float, float]
+    through: float
+
+
 @dataclass(frozen=True)
 class Fix:
     """What the vehicle knows after a surfacing: its place x, y [m] with the fix's error, and the time t [s].
 
     `current` (2,) [m/s] is the mean current of its last dive: the fix less the dead-reckoned way, over the time.
+    `dives` are all its dives so far.
     """
 
     x: float
     y: float
     t: float
     current: tuple[float, float]
+    dives: tuple[Dive, ...] = ()
 
 
 @dataclass
@@ -62,6 +82,9 @@ class Vehicle:
     surfacings: int = 0
     lost: str = ""
     """How the run has ended if the vehicle is lost: "aground" or "left the domain"."""
+    touched: int = 0
+    """Dives that the seabed's clearance has cut short."""
+    dives: tuple[Dive, ...] = ()
 
     def __post_init__(self) -> None:
         settings = self.settings
@@ -72,13 +95,14 @@ class Vehicle:
         self._fix = self._take_fix()
         self._believed = self._fix
         self._own = 0.0, 0.0
-        self._dived_at = self.here.t
+        self._dived_at, self._first_phase = self.here.t, 0
 
     # between two surfacings
 
     def dive(self, orders: Orders) -> Orders:
         """Execute orders until the vehicle comes up or is lost; return those that are left."""
         self._believed, self._own, self._dived_at = self._fix, (0.0, 0.0), self.here.t
+        self._first_phase = len(self.phases)
         left = self._fly_trims(orders) if isinstance(orders, Trims) else self._fly_yos(orders)
         if not self.lost:
             self._surface()
@@ -168,6 +192,7 @@ class Vehicle:
         elif flown.ended == End.BLOCKED and (climbs or len(rows) == 1 or self._on_ground()):
             # a dive that meets the seabed's clearance turns, as with an altimeter; nothing else can
             self.lost = "aground"
+        self.touched += flown.ended == End.BLOCKED
         return None if self.lost else flown
 
     def _on_ground(self) -> bool:
@@ -187,6 +212,18 @@ class Vehicle:
         if time > 0.0:
             way = self._fix[0] - before[0] - self._own[0], self._fix[1] - before[1] - self._own[1]
             self._current = float(way[0] / time), float(way[1] / time)
+            self._note_dive(before, time)
+
+    def _note_dive(self, start: tuple[float, float], time: float) -> None:
+        """Keep what the dive from a fix, which took a `time` [s], has measured."""
+        phases = self.phases[self._first_phase :]
+        deepest = max((-float(phase.rows[:, 3].min()) for phase in phases), default=0.0)
+        if deepest < SHALLOWEST:
+            return
+        yos = sum(phase.glide_angle < 0.0 for phase in phases)
+        when, through = (self._dived_at, self.here.t), math.hypot(*self._own) / time
+        dive = Dive(start, self._fix, *when, deepest, max(yos, 1), self._current, through)
+        self.dives = (*self.dives, dive)
 
     # at the surface
 
@@ -213,7 +250,7 @@ class Vehicle:
     @property
     def fix(self) -> Fix:
         """The last fix, and the current of the last dive."""
-        return Fix(*self._fix, self.here.t, self._current)
+        return Fix(*self._fix, self.here.t, self._current, self.dives)
 
     def _take_fix(self) -> tuple[float, float]:
         off = self.settings.fix_error_m * self.random.standard_normal(2)

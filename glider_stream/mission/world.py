@@ -14,7 +14,7 @@ from ..roadmap.problem import Problem
 from ..water.inspect import divergence_ratio, is_steady, require_level
 from ..water.ocean.flow import grid_flow, slots
 from ..water.sampled import sample_flow
-from .error_field import ErrorField, error_field
+from .error_field import OnMesh, error_field
 from .settings import ForecastError, Mission
 
 POINTS = 4096
@@ -118,6 +118,11 @@ class Worlds:
         return World(true, forecast, error, self._speed, off, divergence_ratio(flow, *sides, true.departure))
 
 
+def rms_speed(problem: Problem, longest: float) -> float:
+    """Return the rms speed [m/s] of a problem's current over its water and a time `longest` [s]."""
+    return _rms(np.asarray(velocities(problem.evaluator.flow, *_points(problem, longest))))
+
+
 def _points(problem: Problem, longest: float) -> tuple[Array, Array, Array, Array]:
     """Return random points of the domain's water x, y, z [m], each with a time of a run t [s]: (n,) each."""
     random = np.random.default_rng(0)
@@ -133,7 +138,7 @@ def _rms(current: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(current**2, axis=-1))))
 
 
-def with_error(true: Problem, field: ErrorField, settings: ForecastError, longest: float) -> kernel.Flow:
+def with_error(true: Problem, field: OnMesh, settings: ForecastError, longest: float) -> kernel.Flow:
     """Return the true current with an error, on a grid that the kernels read like any other flow.
 
     If the true current is on a grid, it stays on that grid; a formula is put on one that is fine enough for the
@@ -234,7 +239,7 @@ def _regridded(flow: kernel.Grid, values: Array) -> kernel.Grid:
     )
 
 
-def _ocean_with_error(flow: kernel.OceanGrid, field: ErrorField, times: Array) -> kernel.OceanGrid:
+def _ocean_with_error(flow: kernel.OceanGrid, field: OnMesh, times: Array) -> kernel.OceanGrid:
     """Return an ocean grid with an error on its own points, at some times [s]."""
     _check_size(times.size * flow.values[0, ..., 0].size)
     x, y = _grid_places(flow)

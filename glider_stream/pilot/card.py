@@ -9,6 +9,7 @@ import numpy as np
 from ..base.clock import moment
 from ..kernels.flow import velocities
 from ..roadmap.problem import Problem
+from ..search.confident import told
 from ..search.path import FROZEN, SURFACE, Leg, Path
 
 DAY = 86_400.0
@@ -70,6 +71,7 @@ class Card:
             "surface_to_surface_s": list(self.under),
             "best_horizontal_mps": self.best,
             **({} if self.path.departure is None else {"frozen": self.path.frozen}),
+            **({} if self.path.confidence is None else {"confidence": dict(self.path.confidence)}),
         }
 
     def __str__(self) -> str:
@@ -87,6 +89,8 @@ class Card:
                 f"* the water is faster than the vehicle's {self.best:.2f} m/s: "
                 f"it cannot hold station on legs {', '.join(outrun)}"
             )
+        sure = self.path.confidence
+        lines += [] if sure is None else [f"{sure['ensemble']}, {sure['flown']}:", *told(sure)]
         return "\n".join([*lines, *([FROZEN] if self.path.frozen else [])])
 
     def _line(self, name: str, row: Row) -> str:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 LOOKS: dict[str, tuple[str, Any]] = {
     "replan": ("#d55e00", "-"),
+    "assimilate": ("#e69f00", (0, (3, 1, 1, 1))),
     "omniscient": (INK, (0, (1, 1))),
     "open-loop": ("#0072b2", (0, (4, 1.2))),
     "depth-averaged": ("#009e73", (0, (6, 1, 1, 1))),

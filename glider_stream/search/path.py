@@ -174,7 +174,8 @@ class Path:
     and `why_not` says the same for JSON, if known. `notes` belong to the files that are written from the path.
     `departure` [s] is the flow's time at which the path begins; None in a steady flow. `frozen`: every leg meets
     the current of that time. `expanded` is the share of the nodes at which the search looked for legs, if it did.
-    `origin` is what it was planned with, if that is known.
+    `origin` is what it was planned with, if that is known. `confidence` says how often, and by when, it arrives
+    in the members of an ensemble, if it was flown there.
     `unthinned` are the number of legs and the time [s] before thinning. `unpolished` are the number of legs, the
     time [s] and the cost before polishing. `rounds` are the rounds of refinement. `least` is a lower bound of the
     cost of every route, from the greatest currents.
@@ -205,6 +206,7 @@ class Path:
     frozen: bool = False
     expanded: float | None = None
     origin: Origin | None = None
+    confidence: Mapping[str, Any] | None = None
 
     @property
     def clock_runs(self) -> bool:
@@ -256,6 +258,7 @@ class Path:
             **({} if self.why_not is None else {"why_not": dict(self.why_not)}),
             **({"notes": list(self.notes)} if self.notes else {}),
             **({} if self.origin is None else {"origin": self.origin.as_dict()}),
+            **({} if self.confidence is None else {"confidence": dict(self.confidence)}),
             "legs": [leg.as_dict() for leg in self.legs],
         }
 

@@ -331,3 +331,12 @@ def test_a_plan_reads_the_member_it_names(tmp_path):
     assert fastest[0] != fastest[1]
     for speed, member in zip(fastest, members, strict=True):
         assert speed <= np.hypot(member.u, member.v).max() * 1.0001
+
+
+def test_a_map_of_a_time_far_from_all_measurements_says_so():
+    scales = {"length": 10e3, "time": 6 * 3600.0, "speed": 0.1, "noise": 0.01, "mean": 0.1, "depth": np.inf}
+    times = [str(START + hours * HOUR) for hours in (1, 48)]
+    found = map_currents([dives()], (20.4, 20.6), (60.4, 60.6), 5e3, times=times, scales=scales)
+    (note,) = [note for note in found.notes if "hardly anything" in note]
+    assert note.startswith(f"the map of {(START + 48 * HOUR).astype('datetime64[s]')}Z")
+    assert "1.88 days off, 7.5 times the scale `time`" in note

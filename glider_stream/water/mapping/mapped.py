@@ -16,6 +16,8 @@ from .measured import Measurements
 
 MOST_POINTS = 20_000_000
 """A map may have at most this many points: columns times depths times times."""
+FAR = 3.0
+"""So many scales of time off, a current is alike by less than 4 %."""
 
 
 def map_currents(
@@ -64,7 +66,21 @@ def map_currents(
     )
     observations, notes = compared(calm, frame, measurements, calm=True)
     fit = fit_for(calm, observations, dict(scales or {}), kernel, seed)
+    notes = (*notes, *_far_in_time(moments, measurements, fit.scales.time))
     return corrected(calm, frame, observations, fit, inducing, notes, calm=True)
+
+
+def _far_in_time(moments: Times, measurements: Sequence[Measurements], scale: float) -> list[str]:
+    """Return a note for each time of a map that lies FAR scales [s] or more from all measurements."""
+    every = [end for part in measurements for end in part.times or ()]
+    notes = []
+    for moment in moments if every and np.isfinite(scale) else ():
+        off = float(np.abs((np.concatenate(every) - moment) / np.timedelta64(1, "ms")).min()) / 1000.0
+        if off >= FAR * scale:
+            far = f"{off / 86_400:.3g} days off, {off / scale:.1f} times the scale `time`"
+            what = f"the map of {moment.astype('datetime64[s]')}Z knows hardly anything"
+            notes.append(f"{what}: its nearest measurement is {far}")
+    return notes
 
 
 def _calm(lon: Range, lat: Range, spacing: float, depth: Array, times: Times) -> OceanFile:

@@ -35,7 +35,7 @@ def read_members(
     require(len(paths) > 0, "an ensemble needs at least one file; got none")
     given = names if isinstance(names, Names) else from_table(Names, names or {}, "names")
     require(given.member is None, f"all members are read: leave out `member` = {given.member!r}")
-    labels = list(dict.fromkeys(label for path in paths for label in _labels(path, given)))
+    labels = member_labels(paths, given)
     require(
         len(labels) > 0 or len(paths) > 1,
         f"{paths[0].name} holds no members: name a file that does, or one file for each member",
@@ -50,8 +50,12 @@ def read_members(
     return members
 
 
+def member_labels(files: Sequence[str | Path], names: Names | None = None) -> list[str]:
+    """Return the labels of the members along a dimension of some files; an empty list if they hold none."""
+    return list(dict.fromkeys(label for file in files for label in _labels(Path(file), names or Names())))
+
+
 def _labels(path: Path, names: Names) -> list[str]:
-    """Return the labels of the members in a file, or an empty list."""
     with opened(path, names.group) as data:
         at = Catalogue(path.name, data, names)
         for component, (variable, how) in at.components().items():

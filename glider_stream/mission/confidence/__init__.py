@@ -1,0 +1,1 @@
+"""Answers with confidence: routes flown in all members of an ensemble of currents, and the choice among them."""

@@ -1,0 +1,149 @@
+"""Ensembles: the problems of currents that may be, which differ in nothing but the current."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.errors import InputError
+from ...base.settings import require
+from ...kernels.flow import Flow, OceanGrid
+from ...roadmap.problem import Problem
+from ...scenario import Scenario
+from ...vehicle.cost import TravelTime
+from ...water.ocean import OceanFlow
+from ...water.ocean.ensemble import member_labels
+from ..orders import is_up
+from ..settings import Mission
+from ..world import Worlds
+
+MOST_MEMBERS = 10_000
+KEPT = 64
+"""So many drawn members are kept in memory; with more, each is drawn again when it is needed."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """The members of an ensemble, and the `forecast` that a pilot plans with.
+
+    `numbers`: those of the members, by which currents and the vehicle's errors are drawn. `words` describe them.
+    """
+
+    mission: Mission
+    forecast: Problem
+    numbers: tuple[int, ...]
+    words: str
+    worlds: Worlds | None = None
+    members: dict[int, Problem] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """The number of members."""
+        return len(self.numbers)
+
+    def each(self) -> Iterator[Problem]:
+        """Yield the members' problems, in the order of `numbers`."""
+        for number in self.numbers:
+            yield self._member(number)
+
+    def _member(self, number: int) -> Problem:
+        made = self.members.get(number)
+        if made is None:
+            assert self.worlds is not None
+            made = self.worlds.world(number).forecast
+        if self.count <= KEPT:
+            self.members[number] = made
+        return self._like_the_forecast(made)
+
+    def between(self, start: Array, goal: Array) -> "Ensemble":
+        """Return the same ensemble for routes from a start to a goal (3,) [m], both at the surface."""
+        for point, name in ((start, "start"), (goal, "goal")):
+            self.forecast.check_point(point, name)
+            up = f"a route with confidence begins and ends at the surface; got a {name} at {-point[2]:g} m"
+            require(is_up(float(point[2])), up)
+        return replace(self, forecast=replace(self.forecast, start=start, goal=goal))
+
+    def _like_the_forecast(self, member: Problem) -> Problem:
+        """Return the forecast's problem with a member's current and terrain."""
+        evaluator = member.evaluator
+        waters = replace(self.forecast.evaluator, flow=evaluator.flow, terrain=evaluator.terrain)
+        return replace(self.forecast, evaluator=waters)
+
+
+def drawn(mission: Mission, count: int, first: int = 0) -> Ensemble:
+    """Return `count` members, from number `first` on: the scenario's current with the mission's random errors."""
+    require(1 <= count <= MOST_MEMBERS, f"`draws` must be from 1 to {MOST_MEMBERS:,}; got {count:,}")
+    require(first >= 0, f"the number of the first draw must be at least 0; got {first}")
+    cure = "name the members' files, or describe the forecast's error in [forecast_error]"
+    require(mission.forecast_error is not None, f"members are drawn from a mission's [forecast_error]; {cure}")
+    worlds = Worlds(mission)
+    numbers = tuple(range(first, first + count))
+    words = f"{count} draws of the forecast's error, {first} to {first + count - 1}"
+    return Ensemble(mission, _timed(worlds.true), numbers, words, worlds)
+
+
+def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
+    """Return the members of a file, or one of each of several files; the forecast is their mean.
+
+    InputError unless the members have the same points and times.
+    """
+    scenarios = _scenarios(mission.scenario, files)
+    problems = [_timed(scenario.problem()) for scenario in scenarios]
+    mean = _mean([problem.evaluator.flow for problem in problems])
+    forecast = replace(problems[0], evaluator=replace(problems[0].evaluator, flow=mean))
+    until = forecast.departure + mission.arrival.longest
+    known = forecast.evaluator.flow.extent
+    why = f"`arrival.longest_hours` = {mission.arrival.longest_hours:g} reaches beyond the times of the members"
+    require(until <= known.t_hi, f"{why}, which end {(known.t_hi - forecast.departure) / 3600:.3g} h later")
+    names = ", ".join(Path(file).name for file in files[:3]) + (", ..." if len(files) > 3 else "")
+    numbers = tuple(range(len(problems)))
+    return Ensemble(
+        mission,
+        forecast,
+        numbers,
+        f"{len(problems)} members of {names}; the forecast is their mean",
+        members=dict(zip(numbers, problems, strict=True)),
+    )
+
+
+def _mean(flows: Sequence[Flow]) -> OceanGrid:
+    """Return the mean of currents on one grid; InputError if their points or times differ."""
+    grids = [flow for flow in flows if isinstance(flow, OceanGrid)]
+    first, total = grids[0], np.zeros_like(grids[0].values)
+    for n, grid in enumerate(grids):
+        alike = grid.values.shape == first.values.shape and np.array_equal(grid.times, first.times)
+        alike = alike and np.array_equal(grid.levels, first.levels) and grid.extent[:4] == first.extent[:4]
+        alike = alike and np.array_equal(grid.index_map, first.index_map)
+        require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
+        total += grid.values
+    fastest = max(grid.extent.max_speed for grid in grids)
+    return first._replace(values=total / len(grids), extent=first.extent._replace(max_speed=fastest))
+
+
+def first_member(files: Sequence[str | Path]) -> list[str]:
+    """Return the overrides with which a scenario reads the first of the members in some files."""
+    labels = member_labels(files)
+    quoted = ", ".join(f'"{Path(file).absolute()}"' for file in (files if labels else files[:1]))
+    return [f"flow.file=[{quoted}]", *([f'flow.member="{labels[0]}"'] if labels else [])]
+
+
+def _scenarios(scenario: Scenario, files: Sequence[str | Path]) -> list[Scenario]:
+    flow = scenario.flow
+    if not isinstance(flow, OceanFlow):
+        raise InputError('members from files are for a scenario whose [flow] has kind = "netcdf"; draw them')
+    names = tuple(str(Path(file).absolute()) for file in files)
+    labels = member_labels(files)
+    one = "holds no members: name a file that does, or one file for each member"
+    require(len(labels) > 0 or len(files) > 1, f"{Path(files[0]).name} {one}")
+    if labels:
+        flows = [replace(flow, file=names, member=label) for label in labels]
+    else:
+        flows = [replace(flow, file=(name,), member=None) for name in names]
+    return [replace(scenario, flow=flow) for flow in flows]
+
+
+def _timed(problem: Problem) -> Problem:
+    """Return the problem with time as its cost: confidence is about arrivals."""
+    return replace(problem, evaluator=replace(problem.evaluator, cost=TravelTime()))
