@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from helpers.reference import replay_rising
 
+from glider_stream.kernels.control import DIVE, control_towards
 from glider_stream.kernels.edges import STATUS, TIME, Status
 from glider_stream.kernels.legs import fly_legs
 from glider_stream.kernels.motion import traced
 from glider_stream.kernels.place import Place, Velocity
-from glider_stream.roadmap.steering import FlowMapMethod
+from glider_stream.roadmap.steering import FlowMapMethod, StreamlineMethod
 from glider_stream.roadmap.verify import replayed_misses
 from glider_stream.water.analytic import InternalWave, Upwelling
 
@@ -163,3 +164,22 @@ def test_a_pair_whose_depth_no_glide_reaches_has_a_status_of_its_own(judge, eval
     )
     assert dive == Status.CARRIED_AWAY
     assert climb == Status.CONNECTED
+
+
+@pytest.mark.wide
+def test_the_paper_s_controls_are_flown_to_their_closest_approach(evaluator, uniform):
+    line = evaluator(uniform, StreamlineMethod, 16, tolerance=20.0)
+    start, goal = np.array([0.0, 0.0, -20.0]), np.array([150.0, 200.0, -200.0])
+    found = line.connect_pair(start, goal)
+    assert found.status == Status.CONNECTED
+    rows = line.trace(start, found, 0.0)
+    assert np.linalg.norm(rows[-1, 1:] - goal) == pytest.approx(found.miss, abs=1e-9)
+    # in a uniform current each control is a straight line
+    best = np.inf
+    for angle, heading in line.control_line(start, goal, 16):
+        c = control_towards(line.polar, DIVE, angle, heading)
+        over = np.array([c.u + U, c.v + V, c.w + 0.05])
+        time = (goal - start) @ over / (over @ over)
+        if np.linalg.norm(start + time * over - goal) < 20.0:
+            best = min(best, time)
+    assert found.time == pytest.approx(best, abs=1e-6)
