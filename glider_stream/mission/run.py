@@ -138,8 +138,11 @@ class _Run:
         """Fly until the run ends; return how."""
         vehicle = self.vehicle
         orders = self._plan()
-        if orders is None:
+        if orders is None and not self.policy.replans:
             return "no plan"
+        if orders is None:
+            self.without += 1
+            orders = self._home()
         while True:
             orders = vehicle.dive(orders)
             if ended := self._now(departure):
@@ -155,8 +158,11 @@ class _Run:
             if _is_empty(orders):
                 if not self.policy.replans:
                     return "missed the goal"
-                # without a list the vehicle heads for the goal until a call brings a plan
-                orders = self.office.towards(self.office.goal[None, :2])
+                orders = self._home()
+
+    def _home(self) -> Orders:
+        """Return the orders of a vehicle without a list: it heads for the goal until a call brings a plan."""
+        return self.office.towards(self.office.goal[None, :2])
 
     def _now(self, departure: float) -> str:
         """Return how the run ends here and now; empty if it goes on."""

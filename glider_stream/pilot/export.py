@@ -24,6 +24,7 @@ from . import seaglider, slocum
 from .route_maps import FIRST, OUR_NAME, STOP
 from .slocum import list_number, mission_files
 from .slocum_files import MOST_WAYPOINTS
+from .waypoints import skipped
 from .windows import HOURS, Window, windows
 
 Texts = dict[str, str]
@@ -232,14 +233,20 @@ def _windows_csv(path: Path, name: str, options: Options) -> Texts:
     return _table(rows, name)
 
 
+RADII = {".ma": slocum.RADIUS, "targets": seaglider.RADIUS}
+"""The usual arrival radius [m] of each vehicle, by the form of its files."""
+
+
+def _radius(form: str, options: Options) -> float:
+    return RADII[form] if options.arrival_radius is None else options.arrival_radius
+
+
 def _goto_lists(path: Path, name: str, options: Options) -> Texts:
-    radius = slocum.RADIUS if options.arrival_radius is None else options.arrival_radius
-    return mission_files(path, name, options.most_waypoints, radius)
+    return mission_files(path, name, options.most_waypoints, _radius(".ma", options))
 
 
 def _targets(path: Path, name: str, options: Options) -> Texts:
-    radius = seaglider.RADIUS if options.arrival_radius is None else options.arrival_radius
-    return seaglider.targets(path, name, radius)
+    return seaglider.targets(path, name, _radius("targets", options))
 
 
 EXPORTS: dict[str, Callable[[Path, str, Options], Texts]] = {
@@ -324,7 +331,10 @@ def export_path(
     for name, text in texts.items():
         with replacing(place.with_name(name)) as temporary:
             temporary.write_text(text, encoding="utf-8")
+    notes = skipped(path, _radius(form, chosen)) if form in RADII else []
     if form == ".ma":
-        for note in slocum.clear_leftovers(place.parent, place.name, list(texts)):
-            say(note)
+        notes += slocum.altitude_notes(path, place.name)
+        notes += slocum.clear_leftovers(place.parent, place.name, list(texts))
+    for note in notes:
+        say(note)
     return [place.with_name(name) for name in texts]

@@ -30,7 +30,17 @@ def targets(path: Path, name: str, radius: float = RADIUS) -> dict[str, str]:
         f"radius={radius:g} goto={after}"
         for here, after, at in zip(names, [*names[1:], names[-1]], places, strict=True)
     ]
-    return {name: "\n".join(["/ a route of glider-stream", *lines]) + "\n"}
+    return {name: "\n".join(["/ a route of glider-stream", f"/ {_depths(path)}", *lines]) + "\n"}
+
+
+def _depths(path: Path) -> str:
+    """Return what the plan says of depths, which a targets file cannot hold."""
+    deepest = max(-float(z) for leg in path.legs for z in (leg.start[2], leg.end[2]))
+    clearance = "a clearance that it does not tell" if path.origin is None else f"{path.origin.clearance:g} m"
+    return (
+        f"this file holds no depth: the plan dives to {deepest:g} m ($D_TGT) and keeps {clearance} above the "
+        "seabed ($ALTIM_BOTTOM_TURN_MARGIN)"
+    )
 
 
 class Target(NamedTuple):

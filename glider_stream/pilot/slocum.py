@@ -13,7 +13,14 @@ import numpy as np
 from ..base.settings import require
 from ..search.path import Path
 from ..water.frame import wrapped
-from .slocum_files import LEAST_DEPTH, LEAST_RADIUS, MOST_DEPTH, MOST_WAYPOINTS, read_mission_file
+from .slocum_files import (
+    LEAST_DEPTH,
+    LEAST_RADIUS,
+    MOST_ALTITUDE,
+    MOST_DEPTH,
+    MOST_WAYPOINTS,
+    read_mission_file,
+)
 from .waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
 
 RADIUS = 500.0
@@ -21,8 +28,8 @@ RADIUS = 500.0
 NAME = re.compile(r"goto_l(\d\d)\.ma")
 SERIES = re.compile(r"# written by glider-stream: list (\d+) of the route that begins in (goto_l\d\d\.ma)")
 """The comment that marks our own lists."""
-ALTITUDE = 5
-"""The vehicle turns this far above the bottom [m] in any plan: masterdata's value."""
+LEAST_ALTITUDE = 5.0
+"""The vehicle turns at least this far above the bottom [m], whatever the plan keeps: masterdata's value."""
 STEEPEST = math.radians(26.0)
 """The pitch of the dive or climb if the route has no such leg: masterdata's value."""
 
@@ -92,33 +99,61 @@ def yo(path: Path) -> str:
     require(deep <= MOST_DEPTH, limit)
     room = f"the route stays between {planned:g} and {max(depth):g} m, but a Slocum's yo turns at {LEAST_DEPTH:g}"
     require(deep > shallow, f"{room} m and more; plan deeper, or write a file of another kind")
-    dives = [leg.glide_angle for leg in path.legs if leg.glide_angle < 0] or [-STEEPEST]
-    climbs = [leg.glide_angle for leg in path.legs if leg.glide_angle > 0] or [STEEPEST]
+    dives = [leg.glide_angle for leg in path.legs if leg.glide_angle < 0]
+    climbs = [leg.glide_angle for leg in path.legs if leg.glide_angle > 0]
+    height, reason = altitude(path)
     raised = "" if shallow == planned else f"   # the plan has {planned:g}, {LEAST_DEPTH:g} is the least"
     return "\n".join([
         "behavior_name=yo",
-        f"# glide angles of the plan: dives {_range(dives)}, climbs {_range(climbs)} degrees; medians below",
+        f"# glide angles of the plan: dives {_range(dives)}, climbs {_range(climbs)}; medians below",
         "# pitch is the glide angle less the angle of attack, some 3 degrees: trim it in the water",
+        "# a route surfaces at each waypoint: your surfac file must say so, a yo only turns below the surface",
         "# buoyancy is the vehicle's default: add d_use_bpump, d_bpump_value and those of the climb to change it",
         "<start:b_arg>",
         "\tb_arg: start_when(enum) 2          # pitch idle",
         "\tb_arg: num_half_cycles_to_do(nodim) -1",
         f"\tb_arg: d_target_depth(m) {deep:g}",
-        f"\tb_arg: d_target_altitude(m) {ALTITUDE}   # turns this far above the bottom; -1 ignores it",
+        f"\tb_arg: d_target_altitude(m) {height:g}   # turns this far above the bottom: {reason}",
         "\tb_arg: d_use_pitch(enum) 3         # servo",
-        f"\tb_arg: d_pitch_value(X) {float(np.median(dives)):.4f}",
+        f"\tb_arg: d_pitch_value(X) {float(np.median(dives or [-STEEPEST])):.4f}",
         f"\tb_arg: c_target_depth(m) {shallow:g}{raised}",
         "\tb_arg: c_target_altitude(m) -1",
         "\tb_arg: c_use_pitch(enum) 3         # servo",
-        f"\tb_arg: c_pitch_value(X) {float(np.median(climbs)):.4f}",
+        f"\tb_arg: c_pitch_value(X) {float(np.median(climbs or [STEEPEST])):.4f}",
         "\tb_arg: end_action(enum) 2          # resume",
         "<end:b_arg>",
     ]) + "\n"  # fmt: skip
 
 
+def altitude(path: Path) -> tuple[float, str]:
+    """Return the height above the bottom [m] at which the vehicle turns, and why.
+
+    It is the plan's clearance, within what the vehicle accepts: never less, unless the plan keeps more than
+    MOST_ALTITUDE.
+    """
+    clearance = None if path.origin is None else path.origin.clearance
+    if clearance is None:
+        return LEAST_ALTITUDE, "the plan does not tell its clearance, put yours here"
+    if clearance > MOST_ALTITUDE:
+        return MOST_ALTITUDE, f"LESS than the plan's clearance of {clearance:g} m; {MOST_ALTITUDE:g} is the most"
+    if clearance < LEAST_ALTITUDE:
+        return LEAST_ALTITUDE, f"the plan's clearance is {clearance:g} m, {LEAST_ALTITUDE:g} is the least"
+    return clearance, "the plan's clearance"
+
+
+def altitude_notes(path: Path, name: str) -> list[str]:
+    """Return a sentence if the yo file beside the list `name` does not keep the plan's clearance."""
+    height, reason = altitude(path)
+    clearance = None if path.origin is None else path.origin.clearance
+    keeps = clearance is not None and height >= clearance
+    return [] if keeps else [f"yo{list_number(name):02}.ma has d_target_altitude {height:g} m: {reason}"]
+
+
 def _range(angles: list[float]) -> str:
+    if not angles:
+        return f"none ({math.degrees(STEEPEST):g} degrees, the vehicle's default, stands for them)"
     low, high = (math.degrees(angle) for angle in (min(angles), max(angles)))
-    return f"{low:.1f} to {high:.1f}"
+    return f"{low:.1f} to {high:.1f} degrees"
 
 
 def clear_leftovers(folder: File, first: str, written: list[str]) -> list[str]:

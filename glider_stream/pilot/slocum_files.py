@@ -15,6 +15,8 @@ MOST_WAYPOINTS = 8
 """A goto list may hold this many waypoints; a vehicle can be compiled with another number."""
 LEAST_DEPTH, MOST_DEPTH = 3.0, 1000.0
 """A yo turns between these depths [m]."""
+MOST_ALTITUDE = 100.0
+"""The greatest height above the bottom [m] at which a yo can turn."""
 LEAST_RADIUS = 10.0
 """The smallest arrival radius of a waypoint [m]."""
 FARTHEST = 2_000e3
@@ -66,7 +68,7 @@ GOTO_LIST = {
 }
 _HALF = {
     "target_depth": Bounds("m", LEAST_DEPTH, MOST_DEPTH),
-    "target_altitude": Bounds("m", -1, 100),
+    "target_altitude": Bounds("m", -1, MOST_ALTITUDE),
     "use_bpump": _choice(0, 1, 2, 3, 4),
     "bpump_value": Bounds("X", -1000, 1000),
     "use_pitch": _choice(1, 2, 3, 4),

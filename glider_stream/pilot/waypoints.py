@@ -1,6 +1,8 @@
 """Waypoints: the places where a route surfaces, and how they are written in vehicles' files."""
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from ..base.settings import require
 from ..search.path import SURFACE, Path
@@ -21,6 +23,21 @@ def waypoints(path: Path) -> list[Waypoint]:
     ends = [(leg.lonlat[1], leg.end[2]) for leg in path.legs[:-1] if leg.lonlat is not None]
     places = [place for place, z in ends if z >= -SURFACE]
     return [Waypoint(float(lon), float(lat)) for lon, lat in (*places, path.lonlat[1])]
+
+
+def skipped(path: Path, radius: float) -> list[str]:
+    """Return a sentence if a vehicle would count waypoints as reached as soon as it heads for them.
+
+    `radius` [m]: at this distance a waypoint counts as reached.
+    """
+    ends = [leg.end for leg in path.legs[:-1] if leg.end[2] >= -SURFACE] + [path.goal]
+    apart = [math.dist(a[:2], b[:2]) for a, b in pairwise(ends)]
+    near = sum(distance <= radius for distance in apart)
+    if not near:
+        return []
+    cure = "set a smaller --arrival-radius, or plan fewer surfacings"
+    lie = f"{near} of the {len(ends)} waypoints {'lies' if near == 1 else 'lie'} within the arrival radius of"
+    return [f"{lie} {radius:g} m of the one before, so a vehicle flies past, not to them; {cure}"]
 
 
 def degrees_and_minutes(degrees: float) -> str:

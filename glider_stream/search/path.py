@@ -2,6 +2,7 @@
 
 import json
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -150,6 +151,11 @@ class Origin:
     departure: float = 0.0
     most_yos: int | None = None
     most_hours: float | None = None
+
+    @property
+    def clearance(self) -> float:
+        """The distance [m] that the plan keeps above the seabed; 0 where the scenario names none."""
+        return float(tomllib.loads(self.scenario).get("terrain", {}).get("clearance", 0.0))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the table that is written to the path file."""
@@ -366,7 +372,13 @@ def _read_origin(table: Any, file: str | File) -> Origin:
     where = f"`origin` of the path file {file}"
     require(isinstance(table, dict), f"{where} must be a table; got {table!r}; write it with `query -o`")
     rest = {"departure" if name == "departure_s" else name: value for name, value in table.items()}
-    return from_table(Origin, rest, where)
+    origin = from_table(Origin, rest, where)
+    try:
+        known = math.isfinite(origin.clearance)
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        known = False
+    require(known, f"the scenario in {where} is no scenario's text; write it with `query -o`")
+    return origin
 
 
 def _read_leg(leg: Any, where: str) -> Leg:

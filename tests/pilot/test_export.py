@@ -12,10 +12,12 @@ from helpers.routes import STOPS, assert_places, route
 
 from glider_stream.base.errors import InputError
 from glider_stream.pilot.export import ANYWHERE, EXPORTS, export_path
+from glider_stream.pilot.seaglider import target_faults
 from glider_stream.pilot.slocum import goto_list, mission_files
 from glider_stream.pilot.slocum_files import goto_faults as lint
+from glider_stream.pilot.slocum_files import read_mission_file, yo_faults
 from glider_stream.pilot.waypoints import Waypoint, degrees_and_minutes, from_degrees_and_minutes, waypoints
-from glider_stream.search.path import FROZEN
+from glider_stream.search.path import FROZEN, Origin
 from glider_stream.water.frame import LocalFrame
 
 
@@ -130,6 +132,51 @@ def test_slocum_files_follow_the_rules(tmp_path):
     assert "d_pitch_value(X) -0.4000\n" in yo
 
 
+def with_clearance(clearance):
+    """The route, planned with this clearance above the seabed [m]; None for a plan that does not tell it."""
+    if clearance is None:
+        return route()
+    return replace(route(), origin=Origin(f"[terrain]\nclearance = {clearance}\n"))
+
+
+@pytest.mark.parametrize(
+    ("clearance", "height", "said"),
+    [
+        (50.0, 50.0, None),
+        (7.25, 7.25, None),
+        (2.0, 5.0, None),
+        (100.0, 100.0, None),
+        (150.0, 100.0, "clearance of 150 m"),
+        (None, 5.0, "does not tell its clearance"),
+    ],
+)
+def test_the_yo_turns_at_the_plans_clearance_or_says_that_it_does_not(tmp_path, clearance, height, said):
+    notes = []
+    export_path(with_clearance(clearance), tmp_path / "goto_l10.ma", notes.append, arrival_radius=100.0)
+    text = (tmp_path / "yo10.ma").read_text()
+    assert yo_faults(text) == []
+    values = {one.name: float(one.value) for one in read_mission_file(text).arguments}
+    assert values["d_target_altitude"] == height
+    assert [note for note in notes if said is None or said not in note] == []
+    assert len(notes) == (0 if said is None else 1)
+
+
+def test_targets_say_which_depths_they_cannot_hold(tmp_path):
+    export_path(with_clearance(50.0), tmp_path / "targets")
+    text = (tmp_path / "targets").read_text()
+    assert target_faults(text) == []
+    assert "dives to 200 m ($D_TGT) and keeps 50 m above the seabed" in text
+
+
+@pytest.mark.parametrize("name", ["goto_l10.ma", "targets"])
+def test_waypoints_within_the_radius_of_each_other_are_told(tmp_path, name):
+    # the route surfaces at (1800, 700), and its goal lies 728 m from there
+    for radius, count in ((727.0, 0), (729.0, 1)):
+        notes = []
+        export_path(with_clearance(50.0), tmp_path / name, notes.append, arrival_radius=radius)
+        assert sum("within the arrival radius" in note for note in notes) == count
+
+
 def test_many_waypoints_take_several_lists():
     stops = [[100.0 * n, 0.0, 0.0 if n % 2 == 0 else -50.0] for n in range(41)]
     files = mission_files(route(stops=stops), "goto_l05.ma")
@@ -179,7 +226,11 @@ def test_seaglider_targets(tmp_path):
     lines = (tmp_path / "targets").read_text().splitlines()
     assert lines[0].startswith("/")
     assert not any(line.endswith(" ") for line in lines)
-    rows = {line.split()[0]: dict(part.split("=") for part in line.split()[1:]) for line in lines[1:]}
+    rows = {
+        line.split()[0]: dict(part.split("=") for part in line.split()[1:])
+        for line in lines
+        if not line.startswith("/")
+    }
     assert all(row["goto"] in rows for row in rows.values())
     assert rows["WP002"]["goto"] == "WP002"
     lon, lat = (from_degrees_and_minutes(rows["WP001"][name]) for name in ("lon", "lat"))

@@ -157,14 +157,14 @@ def test_how_many_waypoints_a_list_may_hold_is_the_installations(tmp_path, capsy
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("goto=WP002\n", "goto=WP003\n", "target WP001 in line 2 has goto=WP003, but that target does not exist"),
-        ("radius=200 goto=WP002\nWP002", "radius=200 goto=WP002 \nWP002", "line 2 begins or ends with a blank"),
+        ("goto=WP002\n", "goto=WP003\n", "target WP001 in line 3 has goto=WP003, but that target does not exist"),
+        ("radius=200 goto=WP002\nWP002", "radius=200 goto=WP002 \nWP002", "line 3 begins or ends with a blank"),
         ("radius=200", "radius=0", "has radius=0; it must be from 0.001"),
-        (" radius=200", "", "target WP001 in line 2 has no radius"),
+        (" radius=200", "", "target WP001 in line 3 has no radius"),
         ("radius=200", "radius=200 speed=3", "has the unknown key speed"),
         ("lat=3800", "lat=3870", "has lat=3870"),
         ("lat=3800", "lat=9800", "98.0063 degrees; at most 90"),
-        ("WP002 lat", "WP001 lat", "target WP001 in line 3 is given twice"),
+        ("WP002 lat", "WP001 lat", "target WP001 in line 4 is given twice"),
         ("WP001 lat", "WP-1 lat", "must have a name of letters and numbers"),
         ("/ a route", "/ a 26° route", "outside ASCII"),
         ("radius=200", "radius=200 escape=HOME", "has escape=HOME, but that target does not exist"),
