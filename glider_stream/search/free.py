@@ -61,7 +61,8 @@ class FreeAir(Air):
     def limits(self, begin: Array, end: Array) -> tuple[Array, Array]:
         """Return the least durations (n,) [s]; there is no greatest."""
         rise, (vertical, _) = end[:, 2] - begin[:, 2], self.speeds
-        return rise / np.where(rise > 0, vertical[-1], vertical[0]), np.full(len(rise), np.inf)
+        least = rise / np.where(rise > 0, vertical[-1], vertical[0])
+        return np.maximum(least, TINY), np.full(len(rise), np.inf)
 
     def _longest(self, angle: Array) -> Array | float:
         return LONGEST_CHANGE * angle
@@ -73,7 +74,9 @@ class FreeAir(Air):
         time, heading = row[:, ANGLE], row[:, HEADING]
         vertical = (row[:, Z_END] - row[:, Z]) / time
         level = np.interp(vertical, *self.speeds)
-        return np.stack([level * np.cos(heading), level * np.sin(heading), vertical], axis=-1), time
+        through = np.empty((len(row), 3))
+        through[:, 0], through[:, 1], through[:, 2] = level * np.cos(heading), level * np.sin(heading), vertical
+        return through, time
 
     def along(self, begin: Array, end: Array, glides: Glides, share: float | Array) -> Array:
         """Return the positions (n, 3) [m] of legs after a share of their duration, one for all or (n,)."""

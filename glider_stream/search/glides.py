@@ -22,6 +22,9 @@ AGREED = 1e-6
 """Legs of a route in a flow that rises have found their times when these change by less [s]."""
 MOST_STEPS = 12
 """At most this many Newton steps are made from a guess; a near guess needs two or three."""
+PATIENCE = 2
+"""A leg is given up after this many steps in a row, none of them shortened, that do not halve its least miss.
+Most would have to be steeper or shallower than the polar allows, and stay at that limit."""
 LONGEST_TURN = 0.3
 """A Newton step changes glide angle and heading by at most this [rad]; beyond it the linear model is wrong."""
 X, Y, Z, T, Z_END, ANGLE, HEADING = range(7)
@@ -77,23 +80,32 @@ class Air:
         lowest, highest = self.limits(begin, end)
         left: Array | float = departs
         flown: Array | None = None
+        least, waited = np.full(len(angle), np.inf), np.zeros(len(angle), np.int64)
+        limited = np.zeros(len(angle), np.bool_)
+        rows = np.empty((3, len(angle), 7))
+        rows[:, :, :T], rows[:, :, Z_END] = begin, end[:, 2]
         for _ in range(MOST_STEPS):
             time = self._expected(begin, end, angle, flown)
             if np.ndim(departs) == 0:
                 left = departs + np.concatenate([[0.0], np.cumsum(time)[:-1]])
-            of = np.column_stack([begin, left, end[:, 2], angle, heading])
-            landings = self._landings(np.stack([of, *(of + self._step(n) for n in (ANGLE, HEADING))]))
+            rows[:, :, T], rows[:, :, ANGLE], rows[:, :, HEADING] = left, angle, heading
+            rows[1, :, ANGLE] += self.steps[ANGLE]
+            rows[2, :, HEADING] += self.steps[HEADING]
+            landings = self._landings(rows)
             ends, flown = landings[..., :2], landings[0, :, 2]
             off = end[:, :2] - ends[0]
-            miss = np.hypot(*off.T)
-            settled = bool((miss <= CLOSE).all()) and self._settled(time, flown)
-            if settled or not np.isfinite(miss).any():
+            miss = np.hypot(off[:, 0], off[:, 1])
+            waited = np.where((miss < 0.5 * least) | limited, 0, waited + 1)
+            least = np.fmin(least, miss)
+            lost = (waited >= PATIENCE) & ~(miss <= CLOSE)
+            if ((miss <= CLOSE) | lost).all() and (lost.any() or self._settled(time, flown)):
                 break
             by_angle, by_heading = ((ends[1 + n] - ends[0]) / self.steps[ANGLE + n] for n in range(2))
             turn = _solve(by_angle, by_heading, off)
-            turn = np.where(np.isfinite(turn), turn, 0.0)
+            turn[~np.isfinite(turn)] = 0.0
             longest = np.maximum(np.abs(turn[:, 0]) / self._longest(angle), np.abs(turn[:, 1]) / LONGEST_TURN)
             turn /= np.maximum(1.0, longest)[:, None]
+            limited = longest > 1.0
             angle, heading = np.clip(angle + turn[:, 0], lowest, highest), heading + turn[:, 1]
         return Glides(angle, heading, time, np.asarray(left), miss)
 
@@ -102,23 +114,20 @@ class Air:
 
         `one_sided` uses half the flights and is less accurate; that is enough to compare two derivatives.
         """
-        of = self._rows(begin, end, glides)
+        of, away = self._rows(begin, end, glides), np.diag(self.steps)[:, None, :]
         if one_sided:
-            ends = self._landings(np.stack([of, *(of + self._step(n) for n in range(7))]))
+            ends = self._landings(np.concatenate([of[None], of + away]))
             by = (ends[1:] - ends[0]) / self.steps[:, None, None]
         else:
-            beside = [of + sign * self._step(n) for n in range(7) for sign in (1.0, -1.0)]
-            ends = self._landings(np.stack(beside))
-            by = (ends[0::2] - ends[1::2]) / (2 * self.steps[:, None, None])  # (7, n, 3)
+            ends = self._landings(np.concatenate([of + away, of - away]))
+            by = (ends[:7] - ends[7:]) / (2 * self.steps[:, None, None])  # (7, n, 3)
         by, later = by[..., :2], by[..., 2]
         # the leg must end at its stop, so the control undoes every other change of the leg's end
         moved = np.zeros((7, len(of), 2))
         moved[0], moved[1], moved[2], moved[5], moved[6] = -by[X], -by[Y], -by[Z], -by[Z_END], -by[T]
         moved[3, :, 0], moved[4, :, 1] = 1.0, 1.0
-        control = np.stack([_solve(by[ANGLE], by[HEADING], off) for off in moved], axis=1)
-        angle = control[..., 0]
-        time = self._time_slopes(begin, end, glides, (angle, control[..., 1], later))
-        return Slopes(time, angle, control[..., 1])
+        angle, heading = np.moveaxis(_solve(by[ANGLE], by[HEADING], moved), (0, 2), (2, 0))
+        return Slopes(self._time_slopes(begin, end, glides, (angle, heading, later)), angle, heading)
 
     def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
         """Return the derivatives (n, 7) of the times.
@@ -170,10 +179,11 @@ class Air:
         polar, way = self.evaluator.polar, climbs.astype(np.intp)
         last = polar.speed.shape[1] - 1
         lowest, highest = self.angles(climbs)
-        at = np.clip((angle - lowest) / (highest - lowest) * last, 0.0, last)
+        at = np.minimum(np.maximum((angle - lowest) / (highest - lowest) * last, 0.0), last)
         below = np.minimum(at.astype(np.intp), last - 1)
-        low = polar.speed[way, below]
-        return np.asarray(low + (at - below) * (polar.speed[way, below + 1] - low))
+        row, table = way * (last + 1) + below, polar.speed.ravel()
+        low = table[row]
+        return np.asarray(low + (at - below) * (table[row + 1] - low))
 
     def sinking(self, angle: Array, climbs: NDArray[np.bool_]) -> Array:
         """Return the vertical speed (n,) [m/s] at glide angles [rad]; it is negative in a dive."""
@@ -181,8 +191,11 @@ class Air:
 
     def through(self, angle: Array, heading: Array, climbs: NDArray[np.bool_]) -> Array:
         """Return the velocities through water (n, 3) [m/s] of controls (n,) [rad]."""
-        along = self.speed(angle, climbs) * np.cos(angle)
-        return np.stack([along * np.cos(heading), along * np.sin(heading), self.sinking(angle, climbs)], axis=-1)
+        speed = self.speed(angle, climbs)
+        along, found = speed * np.cos(angle), np.empty((len(angle), 3))
+        found[:, 0], found[:, 1] = along * np.cos(heading), along * np.sin(heading)
+        found[:, 2] = speed * np.sin(angle) * np.where(climbs, 1.0, -1.0)
+        return found
 
     def _expected(self, begin: Array, end: Array, angle: Array, flown: Array | None) -> Array:
         """Return the times (n,) [s] of legs that fly next; they took `flown` (n,) [s] before, if they flew."""
@@ -226,19 +239,13 @@ class Air:
         """Return the ends and the times x, y [m], t [s] (m, n, 3) of legs with parameters (m, n, 7)."""
         row = of.reshape(-1, 7)
         through, time = self._flights(row)
-        start, height = np.ascontiguousarray(row[:, [X, Y, Z, T]]), np.ascontiguousarray(row[:, Z_END])
+        start, height = np.ascontiguousarray(row[:, : T + 1]), np.ascontiguousarray(row[:, Z_END])
         ends = np.full((len(row), 3), np.nan)
         integration = self.evaluator.integration
         longest = FLOWN * integration.dt * integration.steps
         how = self.evaluator.flow, start, through, time, height, longest, integration.dt
         in_parallel(partial(fly_legs, *how, ends), len(row), LEGS_AT_ONCE)
         return ends.reshape(*of.shape[:2], 3)
-
-    def _step(self, n: int) -> Array:
-        """Return the step (7,) that changes only parameter `n` of a leg."""
-        step = np.zeros(7)
-        step[n] = self.steps[n]
-        return step
 
 
 @dataclass(frozen=True)
@@ -266,9 +273,10 @@ def air_of(evaluator: Evaluator) -> Air:
 
 
 def _solve(by_first: Array, by_second: Array, off: Array) -> Array:
-    """Return the unknowns (a, b), (n, 2), of by_first * a + by_second * b = off; all inputs are (n, 2)."""
-    det = by_first[:, 0] * by_second[:, 1] - by_second[:, 0] * by_first[:, 1]
+    """Return the unknowns (a, b), (..., 2), of by_first * a + by_second * b = off; all inputs are (..., 2)."""
+    det = by_first[..., 0] * by_second[..., 1] - by_second[..., 0] * by_first[..., 1]
+    found = np.empty(np.broadcast_shapes(by_first.shape, off.shape))
     with np.errstate(divide="ignore", invalid="ignore"):
-        a = (by_second[:, 1] * off[:, 0] - by_second[:, 0] * off[:, 1]) / det
-        b = (by_first[:, 0] * off[:, 1] - by_first[:, 1] * off[:, 0]) / det
-    return np.stack([a, b], axis=-1)
+        found[..., 0] = (by_second[..., 1] * off[..., 0] - by_second[..., 0] * off[..., 1]) / det
+        found[..., 1] = (by_first[..., 0] * off[..., 1] - by_first[..., 1] * off[..., 0]) / det
+    return found

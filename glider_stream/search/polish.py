@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, solveh_banded
+from scipy.linalg.lapack import dpbsv
 
 from ..base.arrays import Array
 from ..kernels.edges import Edge, Status
@@ -47,6 +47,9 @@ DAMPED, FREED = 10.0, 0.1
 """The damping is multiplied by the first factor after a step that fails, and by the second after any other."""
 STIFF = 1e3
 """With this damping a step moves almost nothing, so polishing ends."""
+SHIFTS = 40
+"""The diagonal of second derivatives is raised at most this many times, twice as much each time, until they are
+positive definite; then a step is zero."""
 FAR = 0.5
 """In one step a stop moves at most by this share of the longer of its two legs."""
 
@@ -308,18 +311,13 @@ class _Step:
         up, down = (polisher._pumped(stops[:-1, 2] + sign) for sign in (1.0, -1.0))
         leg[:, 2] += np.where(turns, (up - down) / 2, 0.0)
         gradient = leg[1:, :3] + leg[:-1, 3:]
-        size = gradient.size
-        band = np.zeros((6, size))  # the lower band, in the form of solveh_banded
-        count = len(gradient)
-        for n in range(count):
-            block = bent[n, 3:, 3:] + bent[n + 1, :3, :3]
-            for i in range(3):
-                for j in range(i + 1):
-                    band[i - j, 3 * n + j] = block[i, j]
-            if n + 1 < count:
-                for i in range(3):
-                    for j in range(3):
-                        band[3 + i - j, 3 * n + j] = bent[n + 1, 3 + i, j]
+        band = np.zeros((6, gradient.size))  # the lower band, in the form of LAPACK
+        block, below = bent[:-1, 3:, 3:] + bent[1:, :3, :3], bent[1:-1, 3:, :3]
+        for i in range(3):
+            for j in range(3):
+                if i >= j:
+                    band[i - j, j::3] = block[:, i, j]
+                band[3 + i - j, j:-3:3] = below[:, i, j]
         lowest, highest = polisher.problem.lo[2], min(0.0, float(polisher.problem.hi[2]))
         between, free = stops[1:-1], np.ones_like(gradient, np.bool_)
         lies, floats = between[:, 2] <= lowest + 1e-9, between[:, 2] >= highest - 1e-9
@@ -364,14 +362,14 @@ class _Step:
             band[n, : len(both)] = np.where(both, band[n, : len(both)], 0.0)
         scale = np.abs(self.band[0])
         band[0] = np.where(free, band[0] + damping * np.maximum(scale, scale.mean()), 1.0)
-        shift = 0.0
-        while True:
-            try:
-                step = solveh_banded(band, -gradient, lower=True)
+        step = np.zeros_like(gradient)
+        for n in range(SHIFTS):
+            _, solved, failed = dpbsv(band, -gradient, lower=1)
+            if not failed:
+                step = solved
                 break
-            except LinAlgError:
-                shift = max(2 * shift, 1e-2)
-                band[0] = np.where(free, band[0] + shift * np.maximum(scale, scale.mean()), 1.0)
+            # the band is not positive definite
+            band[0] = np.where(free, band[0] + 2**n * 1e-2 * np.maximum(scale, scale.mean()), 1.0)
         move: Array = step.reshape(-1, 3)
         length = np.linalg.norm(move, axis=1)
         move = move * np.minimum(1.0, self.longest / np.maximum(length, 1e-12))[:, None]

@@ -15,6 +15,7 @@ from glider_stream.scenario import scenario_from_text
 from glider_stream.search.glides import Air
 from glider_stream.search.moves import improve
 from glider_stream.search.polish import Polisher
+from glider_stream.vehicle.cost import GRAVITY, Energy
 from glider_stream.water.analytic import Uniform
 
 HEIGHTS = (-150.0, 0.0)
@@ -157,10 +158,30 @@ def test_in_a_uniform_current_it_is_the_straight_optimum(problem):
     assert after.cost < 1.0001 * best
 
 
+def test_in_a_uniform_current_the_least_energy_is_that_of_the_best_glide_angle(problem):
+    # one dive of depth d and one climb cost P T + k d, k the pump's energy of a metre: no more yos cost less
+    pump = Energy(hotel=0.5, trim=0.0, volume=20.0, efficiency=((100.0, 0.3),), density=1025.0)
+    current, way = np.array([0.3, -0.2]), np.array([300.0, -300.0])
+    costly = in_flow(problem, Uniform(*current).kernel(HEIGHTS), cost=pump)
+    start = np.array([-150.0, 150.0, 0.0])
+    stops = zigzag(start, start + np.array([*way, 0.0]), 2, -60.0)
+    stops[1, :2] += [30.0, 50.0]
+    after = improve(polisher(costly), route(costly, stops))
+
+    polar, per_metre = costly.evaluator.polar, 1025.0 * GRAVITY * 20e-6 / 0.3
+    angle = np.linspace(polar.shallowest[0], polar.steepest[0], 20_001)
+    speed = np.interp(angle, np.linspace(angle[0], angle[-1], polar.speed.shape[1]), polar.speed[0])
+    # (Vh^2 - |c|^2) T^2 + 2 c.way T - |way|^2 = 0
+    a, b = (speed * np.cos(angle)) ** 2 - current @ current, current @ way
+    time = np.where(a > 0, (-b + np.sqrt(np.maximum(b * b + a * (way @ way), 0.0))) / a, np.inf)
+    energy = (0.5 + per_metre * speed * np.sin(angle) / 2) * time
+    best = energy.min()
+    assert energy[0] > 1.001 * best  # so the optimum is no end of the polar
+    assert best * (1 - 1e-6) <= after.cost < 1.0005 * best
+
+
 @pytest.mark.slow
 def test_energy_is_what_is_polished_where_the_cost_is_energy(problem):
-    from glider_stream.vehicle.cost import Energy
-
     pump = Energy(hotel=0.5, trim=5.0, volume=500.0, efficiency=((100.0, 0.15), (1000.0, 0.45)), density=1025.0)
     costly = in_flow(problem, problem.evaluator.flow, cost=pump)
     chain = route(costly, zigzag(np.array([-150.0, 150.0, 0.0]), np.array([120.0, -120.0, 0.0]), 4, -90.0))
