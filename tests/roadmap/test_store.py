@@ -28,6 +28,7 @@ from glider_stream.scenario import read_scenario, scenario_from_text
 from glider_stream.vehicle.polar import glider_sha256
 from glider_stream.water.inspect import flow_sha256
 
+USUAL = [status for status in Status if status not in store.RARE]
 DATASETS = {
     "nodes/position": ("<f8", "m"),
     "edges/indptr": ("<i8", "1"),
@@ -93,7 +94,7 @@ def test_the_file_in_plain_h5py(file):
     road = roadmap()
     nodes, edges = len(road.position), road.target.size
     assert edges > 100
-    shapes = {"nodes/position": (nodes, 3), "edges/indptr": (nodes + 1,), "pairs/by_node": (nodes, len(Status))}
+    shapes = {"nodes/position": (nodes, 3), "edges/indptr": (nodes + 1,), "pairs/by_node": (nodes, len(USUAL))}
     with h5py.File(file) as opened:
         found = []
         opened.visititems(lambda name, one: found.append(name) if isinstance(one, h5py.Dataset) else None)
@@ -135,7 +136,7 @@ def test_the_attributes(file):
     created = datetime.fromisoformat(said["created"])
     assert created.utcoffset() == timedelta(0)
     assert abs(datetime.now(UTC) - created) < timedelta(hours=1)
-    counts = {status.name.lower() for status in Status}
+    counts = {status.name.lower() for status in USUAL}
     assert set(pairs) == counts | {"evaluated", "wall_s", "threads"}
     assert pairs["evaluated"] == sum(pairs[name] for name in counts)
     assert pairs["evaluated"] == 77 * 20
@@ -283,3 +284,19 @@ def test_what_differs_between_two_roadmaps(tmp_path, capsys):
     assert not told["same_edges"]
     other = planner.build(scenario_file(tmp_path), overrides=["sampling.shape=[4,4,3]"])
     assert difference(road, other).edges is None
+
+
+def test_a_status_of_rising_water_stands_only_where_a_pair_has_it(tmp_path):
+    plain, rare = roadmap(), Status.CARRIED_AWAY
+    counts = plain.node_counts.copy()
+    counts[3, rare] += 2
+    lifted = replace(plain, node_counts=counts, counts=plain.counts | {"carried_away": 2})
+    for made, named in ((plain, False), (lifted, True)):
+        write_roadmap(made, tmp_path / "road.h5")
+        with h5py.File(tmp_path / "road.h5") as file:
+            assert file["pairs/by_node"].shape[1] == len(Status) - (not named)
+            assert ("carried_away" in file["pairs/by_node"].attrs["statuses"].split()) == named
+            assert ("carried_away" in file["pairs"].attrs) == named
+        read = read_roadmap(tmp_path / "road.h5")
+        assert read.counts == made.counts
+        np.testing.assert_array_equal(read.node_counts, made.node_counts)
