@@ -2,9 +2,12 @@
 
 import math
 import os
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import forecasts
 
 from glider_stream.kernels.flow import Extent, OceanGrid
 from glider_stream.kernels.terrain import OpenWater, Seabed
@@ -19,16 +22,23 @@ from glider_stream.water.sampled import sample_flow
 
 MANY_TESTS = 1000
 COMPILED_BY = {
-    "gw0": [("seed-box", ["steering.method=flow-map"])],
+    "gw0": [("seed-box", ["steering.method=flow-map"]), ("a.toml", [])],
     "gw1": [("seed-box", ["steering.refine=true"]), ("swinging-gyre", ["steering.method=flow-map"])],
 }
-"""What each of two processes compiles before all tests; otherwise both would compile the same kernels."""
+"""What each of two processes compiles before all tests; else both would compile the same kernels. `a.toml` is
+the scenario of a current file, made here."""
 
 
 def pytest_collection_finish(session):
-    if len(session.items) > MANY_TESTS:
-        for scenario, overrides in COMPILED_BY.get(os.environ.get("PYTEST_XDIST_WORKER"), ()):
-            warm_up(read_scenario(scenario, overrides).problem())
+    mine = COMPILED_BY.get(os.environ.get("PYTEST_XDIST_WORKER"), ())
+    if len(session.items) < MANY_TESTS or not mine:
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        forecasts.write(Path(folder) / "a.nc")
+        (Path(folder) / "a.toml").write_text(forecasts.SCENARIO)
+        for scenario, overrides in mine:
+            here = Path(folder) / scenario
+            warm_up(read_scenario(here if here.exists() else scenario, overrides).problem())
 
 
 HEIGHTS = (-250.0, 0.0)

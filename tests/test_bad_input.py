@@ -78,7 +78,7 @@ SCENARIOS = {
         "choose from: dt, steps, tolerance",
     ),
     "unknown key of a vortex": ("y = -30.0", "y = -30.0\nz = 1.0", "vortex.z`", "from: depth, drift, radius"),
-    "unknown flow": ('"vortices"', '"whirl"', "'whirl'", "choose from: double-gyre"),
+    "unknown flow": ('"vortices"', '"whirl"', "'whirl'", "choose from: abc, convection-cells, double-gyre"),
     "a kind that is a number": ('"vortices"', "7", "= 7 is not known", "choose from"),
     "a kind that is a list": ('"nearest"', '["nearest"]', "['nearest']", "choose from"),
     "unknown sampler": ('"grid"', '"gird"', "'gird'", "choose from: grid, halton"),

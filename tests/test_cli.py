@@ -35,7 +35,9 @@ def test_build_says_what_it_made(tmp_path, capsys):
     assert said.err.startswith(LOG)
     *log, note = said.err.splitlines()
     assert log[-1].endswith(" left")
-    assert note.startswith("note: legs leave a node in 7 directions of 36, fewer than 9: routes are slower than")
+    assert note.startswith(
+        "note: legs leave a node in 7 directions of 36, fewer than 9: a query finds a slower route than"
+    )
     assert "dense:  nodes 95 m apart at a depth, 0.45 legs; legs in 7 of 36" in said.out
     assert "\x1b" not in said.err
 

@@ -64,7 +64,7 @@ def draw_current(
     """Draw the current at a depth [m] and a time t [s] (one, or one for each place); return the image.
 
     Colours are speeds, arrows are directions. `pale` is the share of white in the colours, `arrows` the number of
-    arrows along the longer side. With `key` an arrow with its speed stands in the lower right corner.
+    arrows along the longer side. With `key` an arrow with its speed stands above the right corner.
     """
 
     def current(count: int) -> tuple[Array, Array, Array, Array]:
@@ -93,7 +93,7 @@ def draw_current(
     if key and (fastest := float(np.nanmax(speed, initial=0.0))) > 0:
         shown = round_below(0.7 * fastest)
         put = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}, "zorder": 8}
-        named = ax.quiverkey(drawn, 0.93, 0.035, float(np.sqrt(shown / fastest)), f"{shown:g} m/s", **put)
+        named = ax.quiverkey(drawn, 0.95, 1.025, float(np.sqrt(shown / fastest)), f"{shown:g} m/s", **put)
         named.text.set_path_effects(halo())
     ax.set(xlim=ends[:2], ylim=ends[2:], aspect="equal")
     ax.locator_params(nbins=5, steps=[1, 2, 5, 10])

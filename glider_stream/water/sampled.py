@@ -70,4 +70,4 @@ def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, 
     now = np.zeros(px.size)
     read = kernel.currents if kernel.rises(flow) else kernel.velocities
     off = read(flow, px, py, pz, now) - read(sampled, px, py, pz, now)
-    return float(np.linalg.norm(off, axis=1).max())
+    return float(np.hypot.reduce(off, axis=1).max())

@@ -16,6 +16,7 @@ from glider_stream.base.errors import InputError, Stopped
 from glider_stream.base.output import MARKER, remove_abandoned
 from glider_stream.jobs.build import Job, Shard, build_file
 from glider_stream.jobs.journal import RECORD
+from glider_stream.kernels.edges import Status
 from glider_stream.roadmap import store
 from glider_stream.roadmap.roadmap import Edges, by_node, in_order
 from glider_stream.roadmap.store import read_roadmap
@@ -157,7 +158,7 @@ def test_parts_by_their_nodes():
     total = int(degree.sum())
     whole = Edges(
         np.arange(50), degree, rng.integers(0, 50, total).astype(np.int32), rng.random((total, 6)),
-        rng.integers(0, 9, (50, 7)).astype(np.int32),
+        rng.integers(0, 9, (50, len(Status))).astype(np.int32),
     )  # fmt: skip
     for count in (1, 2, 5):
         owner = rng.integers(0, count, 50)

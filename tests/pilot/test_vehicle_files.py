@@ -16,6 +16,8 @@ from glider_stream.pilot.waypoints import Waypoint
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.search.surfacing import Surfacing
 
+CLEARANCE = "yo10.ma has d_target_altitude 5 m: the plan does not tell its clearance, put yours here"
+
 
 def surfacings(count):
     """A route that comes up so many times."""
@@ -36,8 +38,11 @@ def test_lists_of_an_earlier_longer_route_are_removed_and_that_is_said(tmp_path)
     export_path(surfacings(3), tmp_path / "goto_l10.ma", said.append)
     assert names(tmp_path) == ["goto_l10.ma", "yo10.ma"]
     assert said == [
-        f"removed {tmp_path / name}, which was left by an earlier, longer route"
-        for name in ("goto_l11.ma", "goto_l12.ma")
+        CLEARANCE,
+        *(
+            f"removed {tmp_path / name}, which was left by an earlier, longer route"
+            for name in ("goto_l11.ma", "goto_l12.ma")
+        ),
     ]
 
 
@@ -50,8 +55,8 @@ def test_what_a_pilot_wrote_or_changed_stays(tmp_path):
     said = []
     export_path(surfacings(3), tmp_path / "goto_l10.ma", said.append)
     assert names(tmp_path) == ["goto_l10.ma", "goto_l12.ma", "goto_l14.ma", "yo10.ma"]
-    assert len(said) == 3
-    assert f"{changed} belongs to an earlier route and was changed by hand, so it stays" in said[1]
+    assert len(said) == 4
+    assert f"{changed} belongs to an earlier route and was changed by hand, so it stays" in said[2]
 
 
 def test_lists_of_another_route_stay(tmp_path):
@@ -59,7 +64,7 @@ def test_lists_of_another_route_stay(tmp_path):
     said = []
     export_path(surfacings(3), tmp_path / "goto_l10.ma", said.append)
     assert names(tmp_path) == ["goto_l10.ma", "goto_l11.ma", "yo10.ma", "yo11.ma"]
-    assert said == []
+    assert said == [CLEARANCE]
 
 
 # options

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from glider_stream.kernels.flow import Extent, Flow, Grid, contains, cycle, mean_velocity, velocities, velocity
+from glider_stream.kernels.flow import Extent, Grid, Level, contains, cycle, mean_velocity, velocities, velocity
 from glider_stream.scenario import read_scenario
 from glider_stream.water.analytic import (
     DoubleGyre,
@@ -402,7 +402,7 @@ def test_extent_of_an_analytic_flow_is_what_the_scenario_says():
 
 
 def test_there_is_a_flow_here_for_every_kind_of_the_kernels(flows):
-    assert {type(flow) for flow in flows.values()} == set(Flow.__args__)
+    assert {type(flow) for flow in flows.values()} == set(Level.__args__)
 
 
 @pytest.mark.parametrize("kind", KINDS)

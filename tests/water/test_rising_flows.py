@@ -13,7 +13,16 @@ from helpers.small import SCENARIO
 from glider_stream.base.errors import InputError
 from glider_stream.evaluation.baselines import straight
 from glider_stream.evaluation.level_set import bound
-from glider_stream.kernels.flow import RisingGrid, current, cycle, max_rise, rises, velocity
+from glider_stream.kernels.flow import (
+    Rising,
+    RisingGrid,
+    RisingOceanGrid,
+    current,
+    cycle,
+    max_rise,
+    rises,
+    velocity,
+)
 from glider_stream.mission.settings import mission_from_table
 from glider_stream.mission.world import Worlds
 from glider_stream.scenario import read_scenario
@@ -37,6 +46,11 @@ def scattered(count=200):
     rng = np.random.default_rng(0)
     lows, highs = [-500.0, -500.0, -300.0, 0.0], [500.0, 500.0, 0.0, 5000.0]
     return rng.uniform(lows, highs, (count, 4))
+
+
+def test_there_is_a_flow_here_for_every_formula_of_the_kernels():
+    kinds = {type(flow.kernel(DEPTHS)) for flow in FLOWS.values()}
+    assert kinds == set(Rising.__args__) - {RisingGrid, RisingOceanGrid}
 
 
 @pytest.mark.parametrize("name", FLOWS)
