@@ -48,7 +48,7 @@ def near(lon, lat, places):
 
 
 @real
-@pytest.mark.parametrize("name", ROUTES)
+@pytest.mark.parametrize("name", ["ionian", pytest.param("washington", marks=pytest.mark.wide)])
 def test_a_hundred_kilometres_and_its_files(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     scenario = read_scenario("ionian", ROUTES[name])

@@ -99,6 +99,7 @@ def test_plain_text():
     assert plain("a\nb\tc\x00\x7f\x85\udcff") == "a\\nb\\tc\\x00\\x7f\\x85\\udcff"
 
 
+@pytest.mark.wide
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are UTF-8")
 def test_names_that_are_not_utf_8(built, capsys):
     done = shell(
@@ -128,6 +129,7 @@ def test_an_output_with_a_small_alphabet(built):
     assert "no\\u2192\\u03b3.h5" in said.stderr
 
 
+@pytest.mark.wide
 def test_a_notebooks_backend(built):
     nowhere = {"MPLBACKEND": "module://matplotlib_inline.backend_nowhere"}
     done = shell("$G plot road.h5 -o x.png", env=nowhere)
@@ -225,6 +227,7 @@ def test_cores_that_may_be_used(tmp_path, monkeypatch):
     assert cores.usable_cores() == 3
 
 
+@pytest.mark.wide
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity here")
 def test_one_core_by_affinity(place):
     pytest.importorskip("distributed")

@@ -10,7 +10,7 @@ import pytest
 import glider_stream
 
 ROOT = Path(__file__).parents[1]
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.wide]
 
 EXPRESSIONS = {
     "glider_stream.read_roadmap('small.h5')": "glider_stream.roadmap.roadmap.Roadmap",

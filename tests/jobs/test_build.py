@@ -288,6 +288,7 @@ def test_a_folder_that_is_closed_half_way(place):
     assert datasets("road.h5") == expected("streamline")
 
 
+@pytest.mark.wide
 def test_a_command_that_is_killed_goes_on(place):
     """The command line as it is run: interrupted by the terminal's signal, then the same again."""
     scenario = [

@@ -36,7 +36,7 @@ def place(tmp_path, monkeypatch):
     ("law", "change"),
     [
         ("flow map", 0.5),
-        ("reachable", 1.6),
+        pytest.param("reachable", 1.6, marks=pytest.mark.wide),
         pytest.param("radius", 0.5, marks=pytest.mark.wide),
         pytest.param("refined", 0.5, marks=pytest.mark.wide),
         pytest.param("flow map", 1.6, marks=pytest.mark.wide),

@@ -66,6 +66,7 @@ def cached(folder):
 
 
 @pytest.mark.slow
+@pytest.mark.wide
 def test_a_new_process_starts_from_disk_and_an_edit_is_never_stale(copy):
     cold = run(copy)
     files = cached(copy)

@@ -158,6 +158,7 @@ def rows_and_targets(found):
     return dict(zip(pairs, found.outcomes[met, TIME], strict=True))
 
 
+@pytest.mark.wide
 def test_other_methods_begin_each_slice_anew():
     line = "steering.method=streamline", "steering.candidates=16"
     question = problem(*line, "neighbours.kind=nearest", "neighbours.k=6")

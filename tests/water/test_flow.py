@@ -433,7 +433,7 @@ with open(sys.argv[2], "wb") as file:
 """
 
 
-def test_compiled_kernels_give_the_numbers_of_python(flows, evaluator, vortices, tmp_path):
+def test_compiled_kernels_give_the_numbers_of_python(flows, evaluator, sampled, tmp_path):
     points = {kind: scattered(flow, 50, seed=10) for kind, flow in flows.items()}
     rng = np.random.default_rng(11)
     position = np.column_stack([rng.uniform(-60, 60, (6, 2)), [0.0, -90.0, -40.0, -60.0, 0.0, -30.0]])
@@ -445,7 +445,7 @@ def test_compiled_kernels_give_the_numbers_of_python(flows, evaluator, vortices,
         np.arange(0, 31, 5),
         [q for p in range(6) for q in range(6) if q != p],
     )
-    judge = evaluator(vortices, candidates=6, steps=60, tolerance=15.0)
+    judge = evaluator(sampled, candidates=6, steps=60, tolerance=15.0)
     asked, answered = tmp_path / "asked", tmp_path / "answered"
     asked.write_bytes(pickle.dumps((flows, points, judge, batch)))
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}

@@ -2,12 +2,11 @@
 
 import json
 import math
-import subprocess
-import sys
 import warnings
 
 import numpy as np
 import pytest
+from helpers.small import command
 
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.flow import velocity
@@ -562,14 +561,13 @@ def test_a_user_may_say(tmp_path, make, names):
     )
 
 
-def test_describe_takes_a_users_word(tmp_path):
+def test_describe_takes_a_users_word(tmp_path, capsys):
     path = written(tmp_path, plain())
-    program = [sys.executable, "-c", "from glider_stream.cli import main; main()"]
-    command = [*program, "describe", str(path), "--json", "--at", "20.63,60.41,47,2023-02-27T15:00"]
-    said = subprocess.run(command, capture_output=True, text=True)
-    assert said.returncode == 2
-    assert "rotate" in said.stderr
-    done = subprocess.run([*command, "--name", "rotate=grid"], capture_output=True, text=True)
-    point = json.loads(done.stdout)["points"][0]
+    asked = ["describe", path, "--json", "--at", "20.63,60.41,47,2023-02-27T15:00"]
+    said = command(capsys, *asked)
+    assert said.code == 2
+    assert "rotate" in said.err
+    done = command(capsys, *asked, "--name", "rotate=grid")
+    point = json.loads(done.out)["points"][0]
     assert (point["u_east"], point["v_north"]) == pytest.approx(current(20.63, 60.41, 47.0, 15.0), abs=TOLERANCE)
-    assert json.loads(done.stdout)["grid"] == "curved"
+    assert json.loads(done.out)["grid"] == "curved"

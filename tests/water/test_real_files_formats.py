@@ -1,20 +1,18 @@
 """Times, names, gaps, flags and formats as real files have them: right values, or a sentence with the cure."""
 
 import gzip
-import os
-import subprocess
-import sys
 import warnings
 import zipfile
 
 import numpy as np
 import pytest
 from helpers.currents import DOMAIN, LAT, LON, both, current, dataset, written
+from helpers.small import command
 
 from glider_stream.base.errors import InputError
 from glider_stream.water.describe import describe
 from glider_stream.water.frame import LocalFrame
-from glider_stream.water.ocean import ocean_flow, read_currents, sample
+from glider_stream.water.ocean import component, ocean_flow, read_currents, sample
 from glider_stream.water.ocean.grid import CurvedGrid, gaps
 from glider_stream.water.ocean.units import in_metres_per_second
 
@@ -486,24 +484,19 @@ def test_other_formats_name_the_tool_that_converts_them(tmp_path, name):
         read_currents(tmp_path / "all.zip")
 
 
-def test_an_error_of_our_own_is_not_reported_as_damage(tmp_path):
+def test_an_error_of_our_own_is_not_reported_as_damage(tmp_path, capsys, monkeypatch):
     """Exit code 3, one line, and the trace where it is asked for; a truncated file is still exit code 2."""
     path = written(tmp_path, dataset())
-    program = (
-        "import numpy as np, sys\n"
-        "import glider_stream.water.ocean.component as c\n"
-        "c.signs_of = lambda *a: np.zeros(3).reshape(2, 2)\n"
-        "from glider_stream.cli import main\n"
-        "main()\n"
-    )
-    run = [sys.executable, "-c", program, "describe", str(path)]
-    told = subprocess.run(run, capture_output=True, text=True)
-    assert told.returncode == 3
-    assert "this is an error of the program, not of your input: ValueError: cannot reshape" in told.stderr
-    assert "damaged" not in told.stderr
-    assert len(told.stderr.splitlines()) == 1
-    traced = subprocess.run(run, capture_output=True, text=True, env=dict(os.environ, GLIDER_STREAM_TRACE="1"))
-    assert "Traceback" in traced.stderr
+    with monkeypatch.context() as patched:
+        patched.setattr(component, "signs_of", lambda *_: np.zeros(3).reshape(2, 2))
+        told = command(capsys, "describe", path)
+        assert told.code == 3
+        assert "this is an error of the program, not of your input: ValueError: cannot reshape" in told.err
+        assert "damaged" not in told.err
+        assert len(told.err.splitlines()) == 1
+        patched.setenv("GLIDER_STREAM_TRACE", "1")
+        with pytest.raises(ValueError, match="cannot reshape"):
+            command(capsys, "describe", path)
     (tmp_path / "half.nc").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(InputError, match="truncated or damaged"):
         read_currents(tmp_path / "half.nc")
