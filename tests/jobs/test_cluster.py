@@ -25,6 +25,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.wide
 def test_a_worker_that_dies(place):
     with cluster.scheduler("local:2") as workers:
         pids = [int(worker["pid"]) for worker in workers.client.run(lambda: {"pid": os.getpid()}).values()]

@@ -46,6 +46,7 @@ def test_parts_merge_to_the_same_bits(tmp_path, expected):
 
 
 @pytest.mark.filterwarnings("ignore")  # dask's own words while its workers end
+@pytest.mark.wide
 def test_a_cluster_gives_the_same_bits(tmp_path, expected):
     pytest.importorskip("distributed")
     with cluster.scheduler("local:1") as workers:

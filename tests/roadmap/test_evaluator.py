@@ -93,6 +93,7 @@ def check_against_literal(judge, position, departure, least):
 # the fast path changes no result
 
 
+@pytest.mark.wide
 @pytest.mark.slow
 @both_methods
 def test_equals_the_literal_loop_in_vortices(evaluator, vortices, method):

@@ -250,6 +250,7 @@ def test_fewer_legs_are_found_at_their_own_times(gyre):
     assert np.linalg.norm(places - [leg.end for leg in fewer.legs], axis=1).max() < 0.1
 
 
+@pytest.mark.wide
 def test_when_to_leave(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     opened = open_scenario("swinging-gyre", FEW)
