@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 HOTEL, VOLUME, SHARE, DENSITY = 0.5, 20.0, 0.3, 1025.0
 """Hotel load [W], pumped volume [cc], the pump's efficiency, density [kg/m^3]: a best glide that is neither the
 polar's shallowest nor its fastest."""
-FAN, STEP, LATEST = 2880, 2.0, 3000.0
+FAN, STEP, LATEST = 5760, 2.0, 3000.0
 """Headings of the first fan, and the time step and the end of an extremal [s]."""
 NEAR = 100.0
 """Headings that pass the goal nearer than this [m], and nearer than those beside them, are searched again."""
