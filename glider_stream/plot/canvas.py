@@ -69,9 +69,18 @@ def new_figure(width: float, height: float, title: str) -> "Figure":
 
 
 def frozen(figure: "Figure") -> "Figure":
-    """Return the figure with a fixed layout; otherwise each saving would move the panels a little."""
+    """Return the figure with a fixed layout; otherwise each saving would move the panels a little.
+
+    The last digit of the solver's places depends on where its constraints lie in memory, so it is rounded away:
+    the same input gives the same file.
+    """
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+    for ax in figure.axes:
+        place = ax.get_position(original=True).bounds
+        ax.set_position([round(float(part), 9) for part in place], which="original")
+        if ax.get_axes_locator() is None:  # colour bars follow their maps when they are drawn
+            ax.apply_aspect()
     return figure
 
 
