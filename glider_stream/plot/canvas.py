@@ -77,8 +77,8 @@ def frozen(figure: "Figure") -> "Figure":
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for ax in figure.axes:
-        place = ax.get_position(original=True).bounds
-        ax.set_position([round(float(part), 9) for part in place], which="original")
+        x, y, wide, high = (round(float(part), 9) for part in ax.get_position(original=True).bounds)
+        ax.set_position((x, y, wide, high), which="original")
         if ax.get_axes_locator() is None:  # colour bars follow their maps when they are drawn
             ax.apply_aspect()
     return figure
