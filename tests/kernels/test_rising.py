@@ -150,7 +150,8 @@ def test_the_flow_map_finds_every_leg_of_the_closed_form(judge, position):
     assert len(true) > 150
     assert sum(pair in found for pair in true) >= 0.99 * len(true)
     late = [found[pair] - time for pair, time in true.items() if pair in found]
-    assert (np.abs(late) < 0.05).mean() >= 0.98
+    # a few millimetres beside the target are 0.05 s where two legs to it are about to become one
+    assert np.abs(late).max() < 0.06
     hit = rows[:, STATUS] == Status.CONNECTED
     ends = np.repeat(source, np.diff(indptr))[hit][::9], target[hit][::9], rows[hit][::9, TIME:]
     assert replayed_misses(judge, 0.0, position, *ends).max() < 0.1
@@ -159,11 +160,11 @@ def test_the_flow_map_finds_every_leg_of_the_closed_form(judge, position):
 def test_a_pair_whose_depth_no_glide_reaches_has_a_status_of_its_own(judge, evaluator):
     held = judge.flow._replace(w=0.9, max_rise=1.2)
     dive, climb = (
-        evaluator(held, lambda candidates: FlowMapMethod()).connect_pair([0.0, 0.0, a], [150.0, 60.0, b]).status
+        evaluator(held, lambda candidates: FlowMapMethod()).connect_pair([0.0, 0.0, a], [40.0, 0.0, b]).status
         for a, b in ((-50.0, -120.0), (-120.0, -50.0))
     )
     assert dive == Status.CARRIED_AWAY
-    assert climb != Status.CARRIED_AWAY
+    assert climb == Status.CONNECTED
 
 
 @pytest.mark.wide
