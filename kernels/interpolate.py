@@ -1,6 +1,6 @@
-"""Interpolation: pairs of numbers (u and v, i and j) on a regular grid, linear along every axis.
+"""Interpolation: pairs of numbers (u and v, i and j) or rows of four on a regular grid, linear along every axis.
 
-The numbers at two neighbours along the last axis lie side by side: four float64, one vector register. So all
+The pairs at two neighbours along the last axis lie side by side: four float64, one vector register. So all
 axes but the last are interpolated four numbers at a time. Numba's loop vectoriser cannot do that (the loads
 might overlap the stores), and its vectoriser of straight code is off, for miscompilations in LLVM (Numba pull
 request 8852): hence a few lines of LLVM's own. They doubled the flow evaluations
@@ -21,15 +21,26 @@ _FOUR, _TWO = (ir.VectorType(ir.DoubleType(), n) for n in (4, 2))
 _INT = ir.IntType(32)
 
 
+def _between(values, cell, weight):
+    block = values[tuple(slice(int(c), int(c) + 2) for c in cell)]
+    for w in weight:
+        block = block[0] + w * (block[1] - block[0])
+    return block
+
+
 def pair_between(values: Any, cell: Any, weight: Any) -> tuple[float, float]:
     """The pair at a fractional index: values (n_1, ..., n_d, 2), cell (d,) unsigned, weight (d,) of cell + 1.
 
     Nothing is checked: each cell must be below n - 1.
     """
-    block = values[tuple(slice(int(c), int(c) + 2) for c in cell)]
-    for w in weight:
-        block = block[0] + w * (block[1] - block[0])
-    return block[0], block[1]
+    u, v = _between(values, cell, weight)
+    return u, v
+
+
+def row_between(values: Any, cell: Any, weight: Any) -> tuple[float, float, float, float]:
+    """The row of four at a fractional index: values (n_1, ..., n_d, 4), cell and weight as in `pair_between`."""
+    u, v, w, nothing = _between(values, cell, weight)
+    return u, v, w, nothing
 
 
 def _shuffled(builder, vector, lanes):
@@ -54,75 +65,55 @@ def _four_at(context, builder, array, shape, strides, layout, index):
     return row
 
 
-def _in_registers(typing_context, values, cell, weight):
-    def generate(context, builder, signature, arguments):
-        layout, axes = signature.args[0].layout, signature.args[0].ndim - 1
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        shape, strides = (cgutils.unpack_tuple(builder, part) for part in (array.shape, array.strides))
-        below, weights = (cgutils.unpack_tuple(builder, part) for part in arguments[1:])
-        nothing = ir.Constant(below[0].type, 0)
-        above = [builder.add(index, ir.Constant(index.type, 1)) for index in below]
-        rows = []
-        for corner in itertools.product((below, above), repeat=axes - 1):
-            index = [ends[n] for n, ends in enumerate(corner)] + [below[-1], nothing]
-            rows.append(_four_at(context, builder, array, shape, strides, layout, index))
-        for n in range(axes - 1):
-            half = len(rows) // 2
-            rows = [_lerp(builder, rows[m], rows[m + half], weights[n]) for m in range(half)]
-        low, high = (_shuffled(builder, rows[0], lanes) for lanes in ([0, 1], [2, 3]))
-        pair = _lerp(builder, low, high, weights[-1])
-        parts = [builder.extract_element(pair, ir.Constant(_INT, n)) for n in range(2)]
-        return context.make_tuple(builder, signature.return_type, parts)
+def _in_registers(count):
+    """Return Numba's typing of an interpolation of rows of `count` numbers, two or four."""
 
-    return types.UniTuple(types.float64, 2)(values, cell, weight), generate
+    def typed(typing_context, values, cell, weight):
+        def generate(context, builder, signature, arguments):
+            layout, axes = signature.args[0].layout, signature.args[0].ndim - 1
+            array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            shape, strides = (cgutils.unpack_tuple(builder, part) for part in (array.shape, array.strides))
+            below, weights = (cgutils.unpack_tuple(builder, part) for part in arguments[1:])
+            nothing = ir.Constant(below[0].type, 0)
+            above = [builder.add(index, ir.Constant(index.type, 1)) for index in below]
+            apart = axes - 1 if count == 2 else axes  # two pairs, neighbours along the last axis, fill a register
+            rows = []
+            for corner in itertools.product((below, above), repeat=apart):
+                index = [ends[n] for n, ends in enumerate(corner)] + below[apart:] + [nothing]
+                rows.append(_four_at(context, builder, array, shape, strides, layout, index))
+            for n in range(apart):
+                half = len(rows) // 2
+                rows = [_lerp(builder, rows[m], rows[m + half], weights[n]) for m in range(half)]
+            row = rows[0]
+            if count == 2:
+                low, high = (_shuffled(builder, row, lanes) for lanes in ([0, 1], [2, 3]))
+                row = _lerp(builder, low, high, weights[-1])
+            parts = [builder.extract_element(row, ir.Constant(_INT, n)) for n in range(count)]
+            return context.make_tuple(builder, signature.return_type, parts)
+
+        return types.UniTuple(types.float64, count)(values, cell, weight), generate
+
+    return typed
 
 
-_pair_between: Any = intrinsic(_in_registers)
+def _fits(values, cell, weight):
+    plain = values.dtype == types.float64 and values.layout == "C"
+    return plain and values.ndim - 1 == len(cell) == len(weight)
+
+
+_pair_between: Any = intrinsic(_in_registers(2))
+_row_between: Any = intrinsic(_in_registers(4))
 
 
 @overload(pair_between, inline="always", jit_options=BARE)
 def _pair_between_in_kernels(values, cell, weight):
-    plain = values.dtype == types.float64 and values.layout == "C"
-    if not (plain and values.ndim - 1 == len(cell) == len(weight)):
+    if not _fits(values, cell, weight):
         return None
     return lambda values, cell, weight: _pair_between(values, cell, weight)
 
 
-def row_between(values: Any, cell: Any, weight: Any) -> tuple[float, float, float, float]:
-    """The row of four at a fractional index: values (n_1, ..., n_d, 4), cell and weight as in `pair_between`."""
-    block = values[tuple(slice(int(c), int(c) + 2) for c in cell)]
-    for w in weight:
-        block = block[0] + w * (block[1] - block[0])
-    return block[0], block[1], block[2], block[3]
-
-
-def _rows_in_registers(typing_context, values, cell, weight):
-    def generate(context, builder, signature, arguments):
-        layout, axes = signature.args[0].layout, signature.args[0].ndim - 1
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        shape, strides = (cgutils.unpack_tuple(builder, part) for part in (array.shape, array.strides))
-        below, weights = (cgutils.unpack_tuple(builder, part) for part in arguments[1:])
-        nothing = ir.Constant(below[0].type, 0)
-        above = [builder.add(index, ir.Constant(index.type, 1)) for index in below]
-        rows = []
-        for corner in itertools.product((below, above), repeat=axes):
-            index = [ends[n] for n, ends in enumerate(corner)] + [nothing]
-            rows.append(_four_at(context, builder, array, shape, strides, layout, index))
-        for n in range(axes):
-            half = len(rows) // 2
-            rows = [_lerp(builder, rows[m], rows[m + half], weights[n]) for m in range(half)]
-        parts = [builder.extract_element(rows[0], ir.Constant(_INT, n)) for n in range(4)]
-        return context.make_tuple(builder, signature.return_type, parts)
-
-    return types.UniTuple(types.float64, 4)(values, cell, weight), generate
-
-
-_row_between: Any = intrinsic(_rows_in_registers)
-
-
 @overload(row_between, inline="always", jit_options=BARE)
 def _row_between_in_kernels(values, cell, weight):
-    plain = values.dtype == types.float64 and values.layout == "C"
-    if not (plain and values.ndim - 1 == len(cell) == len(weight)):
+    if not _fits(values, cell, weight):
         return None
     return lambda values, cell, weight: _row_between(values, cell, weight)

@@ -125,6 +125,7 @@ class Points(_Table):
         return at_points(*frame.to_local(self.lon, self.lat), self.depth, u, v, t=t, error=self.error)
 
 
+@dataclass(frozen=True)
 class _Ways(_Table):
     """Ways from one place and time to another."""
 
@@ -164,12 +165,6 @@ class Dives(_Ways):
     and back, with so many `yos`.
     """
 
-    lon: Array
-    lat: Array
-    lon_end: Array
-    lat_end: Array
-    start: Times
-    end: Times
     bottom: Array
     east: Array
     north: Array
@@ -214,12 +209,6 @@ class Drifters(_Ways):
     and its speed as even.
     """
 
-    lon: Array
-    lat: Array
-    lon_end: Array
-    lat_end: Array
-    start: Times
-    end: Times
     depth: Array
     error: Array
     notes: tuple[str, ...] = ()

@@ -82,20 +82,9 @@ def on_levels(values: Array, levels: Array, at: Array) -> Array:
 def _with(flow: OceanGrid, values: Array, levels: Array) -> RisingOceanGrid:
     """Return a flow with a vertical part, of values (times, levels, ni, nj, 4) [m/s]."""
     level_slot, slots_per_z = slots(levels)
-    return RisingOceanGrid(
-        values=np.ascontiguousarray(values),
-        levels=levels,
-        level_slot=level_slot,
-        slots_per_z=slots_per_z,
-        times=flow.times,
-        time_slot=flow.time_slot,
-        slots_per_t=flow.slots_per_t,
-        index_map=flow.index_map,
-        per_x=flow.per_x,
-        per_y=flow.per_y,
-        max_rise=float(np.abs(values[..., 2]).max()) * (1 + 1e-12),
-        extent=flow.extent,
-    )
+    new = {"values": np.ascontiguousarray(values), "levels": levels, "level_slot": level_slot}
+    rise = float(np.abs(values[..., 2]).max()) * (1 + 1e-12)
+    return RisingOceanGrid(**flow._asdict() | new | {"slots_per_z": slots_per_z, "max_rise": rise})
 
 
 def _places(frame: LocalFrame, grid: Grid) -> Array:
