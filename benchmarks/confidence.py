@@ -6,14 +6,13 @@ are planned and chosen in 30 draws of the forecast's error, then flown in 200 ot
 
 import argparse
 import json
-import platform
 import time
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from record import earlier, keep, machine
 
-from glider_stream.base.cores import usable_cores
 from glider_stream.mission.confidence.candidates import Search
 from glider_stream.mission.confidence.ensemble import drawn
 from glider_stream.mission.confidence.judged import Criterion, best_of, checked, fly
@@ -43,7 +42,7 @@ def measured(name: str, members: int, held_out: int, quantile: float) -> dict[st
     check = checked(flights, sure)
     return {
         "software": version("glider-stream"),
-        "machine": f"{platform.machine()}, {usable_cores()} cores",
+        "machine": machine(),
         "members": members,
         "held_out": held_out,
         "candidates": len(candidates),
@@ -75,14 +74,11 @@ def main() -> None:
     parser.add_argument("--quantile", type=float, default=0.9)
     parser.add_argument("-o", "--output", type=Path)
     asked = parser.parse_args()
-    record: dict[str, object] = {}
-    if asked.output is not None and asked.output.exists():
-        record = json.loads(asked.output.read_text())
+    record = earlier(asked.output)
     for name in asked.missions:
         record[name] = found = measured(name, asked.members, asked.held_out, asked.quantile)
         print(name, json.dumps(found, indent=1), flush=True)
-        if asked.output is not None:
-            asked.output.write_text(json.dumps(record, indent=1) + "\n")
+        keep(record, asked.output)
 
 
 if __name__ == "__main__":

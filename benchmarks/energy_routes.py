@@ -15,10 +15,7 @@ current it must agree with a closed form, which `closed_form` gives.
 """
 
 import argparse
-import json
 import math
-import os
-import platform
 import sys
 import tomllib
 from pathlib import Path
@@ -27,6 +24,7 @@ from typing import Any
 import numpy as np
 from experiment import random_vortices
 from numpy.typing import NDArray
+from record import keep, machine
 from scipy.optimize import brentq, minimize_scalar
 
 import glider_stream
@@ -227,11 +225,7 @@ def main() -> None:
             if not args.only or name in args.only:
                 rows.append(compared(name, table))
                 print(rows[-1], file=sys.stderr, flush=True)
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"
-    text = json.dumps({"machine": machine, "routes": rows}, indent=1)
-    if args.output:
-        args.output.write_text(text + "\n")
-    print(text)
+    print(keep({"machine": machine(count), "routes": rows}, args.output))
 
 
 if __name__ == "__main__":

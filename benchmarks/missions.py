@@ -6,11 +6,11 @@ currents are worth: `--set 'pilot.policies=["replan", "assimilate", "omniscient"
 """
 
 import argparse
-import json
-import platform
 import time
 from importlib.metadata import version
 from pathlib import Path
+
+from record import earlier, keep, machine
 
 from glider_stream.base.cores import usable_cores
 from glider_stream.mission.campaign import Campaign, simulate
@@ -79,9 +79,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], help="a key of the missions to override")
     parser.add_argument("-o", "--output", type=Path)
     asked = parser.parse_args()
-    record: dict[str, object] = {}
-    if asked.output is not None and asked.output.exists():
-        record = json.loads(asked.output.read_text())
+    record = earlier(asked.output)
     for name in asked.missions:
         overrides = [*asked.set, *([f"flow.file={asked.currents}"] if name == "ionian" else [])]
         campaign, seconds = flown(read_mission(name, overrides), asked.runs, asked.processes)
@@ -93,7 +91,7 @@ def main() -> None:
         print(f"  without errors: {exact}", flush=True)
         record[name] = {
             "software": version("glider-stream"),
-            "machine": f"{platform.machine()}, {usable_cores()} cores",
+            "machine": machine(),
             "runs": asked.runs,
             "seconds": round(seconds, 1),
             "processes": asked.processes,
@@ -102,8 +100,7 @@ def main() -> None:
             "verdict": found,
             "without_errors": exact,
         }
-        if asked.output is not None:
-            asked.output.write_text(json.dumps(record, indent=1) + "\n")
+        keep(record, asked.output)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ second run gives the same bits, on one thread and on two.
 """
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from polished_routes import worst_end
+from record import keep
 
 import glider_stream
 from glider_stream.base.threads import threads
@@ -132,10 +132,7 @@ def main() -> None:
         if not args.only or name in args.only:
             rows.append(tried(name, road, asked, most, args.queries))
             print(rows[-1], file=sys.stderr, flush=True)
-    text = json.dumps(rows, indent=1)
-    if args.output:
-        args.output.write_text(text + "\n")
-    print(text)
+    print(keep(rows, args.output))
     sys.exit(any(row["faults"] for row in rows))
 
 

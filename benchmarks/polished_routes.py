@@ -13,8 +13,6 @@ the travel time of a path of 80 controls that arrives: what can be had lies betw
 
 import argparse
 import json
-import os
-import platform
 import sys
 import time
 import tomllib
@@ -25,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from experiment import random_vortices
+from record import keep, machine
 
 import glider_stream
 from glider_stream.base.threads import threads
@@ -155,11 +154,7 @@ def main() -> None:
         for row in chain(fields, suite, ionian_routes(args.ionian, args.within)):
             rows.append(row)
             print(row, file=sys.stderr, flush=True)
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"
-    text = json.dumps({"machine": machine, "routes": rows}, indent=1)
-    if args.output:
-        args.output.write_text(text + "\n")
-    print(text)
+    print(keep({"machine": machine(count), "routes": rows}, args.output))
 
 
 if __name__ == "__main__":

@@ -8,16 +8,14 @@ the mean and the worst of them. Polished routes are beside.
 """
 
 import argparse
-import json
 import math
-import os
-import platform
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from record import keep, machine
 
 import glider_stream
 from glider_stream.roadmap.builder import build_roadmap
@@ -105,11 +103,7 @@ def main() -> None:
         for jitter in (False, True):
             rows.append(row(per_leg, jitter))
             print(rows[-1], file=sys.stderr, flush=True)
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
-    text = json.dumps({"machine": machine, "rows": rows}, indent=1)
-    if args.output:
-        args.output.write_text(text + "\n")
-    print(text)
+    print(keep({"machine": machine(), "rows": rows}, args.output))
 
 
 if __name__ == "__main__":

@@ -11,12 +11,12 @@ With `--routes` the routes are those of an earlier record, compared with the bou
 
 import argparse
 import json
-import os
-import platform
 import sys
 import time
 from pathlib import Path
 from typing import Any
+
+from record import keep, machine
 
 from glider_stream.base.threads import threads
 from glider_stream.evaluation.suite import LAW, Reference, references
@@ -89,7 +89,7 @@ def main() -> None:
     known = {name: one for name, one in references().items() if one.seconds is not None}
     if args.routes:
         record = json.loads(args.routes.read_text())
-        machine, rows = record["machine"], [compared(row, known[row["problem"]]) for row in record["routes"]]
+        where, rows = record["machine"], [compared(row, known[row["problem"]]) for row in record["routes"]]
     else:
         rows = []
         with threads(None) as count:
@@ -97,14 +97,8 @@ def main() -> None:
                 if not args.only or name in args.only:
                     rows.append(routes(name, one))
                     print(rows[-1], file=sys.stderr, flush=True)
-        machine = (
-            f"{platform.machine()}, {os.cpu_count()} cores, {count} threads, Python {platform.python_version()}"
-        )
-    result = {"machine": machine, "summary": summary(rows), "routes": rows}
-    text = json.dumps(result, indent=1)
-    if args.output:
-        args.output.write_text(text + "\n")
-    print(text)
+        where = machine(count)
+    print(keep({"machine": where, "summary": summary(rows), "routes": rows}, args.output))
 
 
 if __name__ == "__main__":

@@ -113,3 +113,9 @@ NAME = click.option(
     metavar="KEY=VALUE",
     help="A setting for what the files do not hold, as in [flow.names]: u, v, lon, lat, depth, time, units, ...",
 )
+WINDOW_HOURS = click.option(
+    "--window-hours", type=float, metavar="H", help="Length of exported windows; 12 if not given."
+)
+WAYPOINTS = click.option(
+    "--waypoints", type=int, metavar="N", help="The most waypoints in a goto list; 8 if not given."
+)

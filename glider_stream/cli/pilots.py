@@ -9,7 +9,20 @@ import click
 from ..base.terminal import say
 from .answers import show, show_json
 from .group import cli
-from .options import ELSEWHERE, FILE, JSON, ROADMAP, SET, Percentage, fix_place, key_and_value, place, two_numbers
+from .options import (
+    ELSEWHERE,
+    FILE,
+    JSON,
+    ROADMAP,
+    SET,
+    WAYPOINTS,
+    WINDOW_HOURS,
+    Percentage,
+    fix_place,
+    key_and_value,
+    place,
+    two_numbers,
+)
 
 
 @cli.command()
@@ -44,8 +57,8 @@ from .options import ELSEWHERE, FILE, JSON, ROADMAP, SET, Percentage, fix_place,
 @click.option("--most-yos", type=int, help="The rule of surfacing, if not the old plan's.")
 @click.option("--most-hours", type=float, help="The rule of surfacing, if not the old plan's.")
 @click.option("-o", "--output", "outputs", multiple=True, type=FILE, help="A route file to write, as in `query`.")
-@click.option("--window-hours", type=float, metavar="H", help="Length of exported windows; 12 if not given.")
-@click.option("--waypoints", type=int, metavar="N", help="The most waypoints in a goto list; 8 if not given.")
+@WINDOW_HOURS
+@WAYPOINTS
 @click.option(
     "--arrival-radius",
     type=float,

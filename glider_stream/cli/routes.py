@@ -10,7 +10,7 @@ import click
 from ..base.terminal import say
 from .answers import show
 from .group import cli
-from .options import ELSEWHERE, FILE, JSON, ROADMAP, SET, Percentage, place
+from .options import ELSEWHERE, FILE, JSON, ROADMAP, SET, WAYPOINTS, WINDOW_HOURS, Percentage, place
 
 if TYPE_CHECKING:
     from ..opened import OpenedScenario
@@ -65,8 +65,8 @@ ROUTE_OPTIONS = (
     click.option(
         "--card", "as_card", is_flag=True, help="Print the pilot's card: speed over ground, currents, arrivals."
     ),
-    click.option("--window-hours", type=float, metavar="H", help="Length of exported windows; 12 if not given."),
-    click.option("--waypoints", type=int, metavar="N", help="The most waypoints in a goto list; 8 if not given."),
+    WINDOW_HOURS,
+    WAYPOINTS,
     click.option(
         "--arrival-radius",
         type=float,

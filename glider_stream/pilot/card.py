@@ -9,7 +9,7 @@ import numpy as np
 from ..base.clock import moment
 from ..kernels.flow import velocities
 from ..roadmap.problem import Problem
-from ..search.confident import told
+from ..search.confidence_lines import told
 from ..search.path import FROZEN, SURFACE, Leg, Path
 
 DAY = 86_400.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.clock import hours
-from ...search.confident import told
+from ...search.confidence_lines import told
 from ...search.path import Origin, Path, placed
 from ..statistics import Estimate
 from .candidates import Candidate, Search, sent_routes
