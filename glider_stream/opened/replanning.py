@@ -25,7 +25,7 @@ from ..search.query import Planner
 from ..search.surfacing import Surfacing
 from ..search.time_dependent import ClockPlanner
 from ..water.domain import GeographicDomain, domain_from_table
-from .routes import routed
+from .routes import exported, routed, split_outputs
 from .searches import Nodes, Searches
 
 LATEST_FIX = 366 * 86_400.0
@@ -34,6 +34,8 @@ NEAR = 0.03, 0.1
 """A replan with the clock running searches the nodes on ways at most this share longer than the best way, by the
 legs of a roadmap, which are those of another time. Among 38,000 nodes of the Ionian Sea these are thousands. The
 second share is for when the first finds no route, or one that passes nodes of more than half the share."""
+WRITING = "window_hours", "most_waypoints", "arrival_radius"
+"""The options of route files."""
 
 
 class Fix(NamedTuple):
@@ -93,6 +95,19 @@ def _anew(
     searches: Searches, planner: RoutePlanner, ends: tuple[Array, Array], all_nodes: bool, options: dict[str, Any]
 ) -> tuple[Path, RoutePlanner, tuple[str, ...]]:
     """Return a new route, its planner and notes: among the nodes near the best ways, else among all."""
+    writing = {name: value for name, value in options.items() if name in WRITING}
+    finding = {name: value for name, value in options.items() if name not in WRITING}
+    refines = finding.get("within") is not None or finding.get("seconds") is not None
+    files, finding["outputs"] = split_outputs(finding.get("outputs", ()), refines)
+    new, among, said = _found(searches, planner, ends, all_nodes, finding)
+    new = exported(new, files, **writing)
+    return new, among, (*new.notes, *said)
+
+
+def _found(
+    searches: Searches, planner: RoutePlanner, ends: tuple[Array, Array], all_nodes: bool, finding: dict[str, Any]
+) -> tuple[Path, RoutePlanner, tuple[str, ...]]:
+    """Return a new route, its planner, and which nodes were searched; no route file is written."""
     every = all_nodes or type(planner) is not ClockPlanner
     longer = np.zeros(len(searches.position)) if every else _longer(searches, *ends)
     for share in NEAR:
@@ -101,13 +116,12 @@ def _anew(
             break
         nodes = np.ascontiguousarray(searches.position[near])
         among = ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen)
-        new = routed(searches, among, ends, **options)
+        new = routed(searches, among, ends, **finding)
         if new.found and (share == NEAR[-1] or _stays_within(new, searches.position, longer, share / 2)):
-            said = f"{near.mean():.0%} of the nodes, those on ways of the roadmap's legs at most {share:.0%}"
+            which = f"{near.mean():.0%} of the nodes, those on ways of the roadmap's legs at most {share:.0%}"
             cure = "--all-nodes searches all, which takes longer"
-            return new, among, (*new.notes, f"searched among {said} longer than their best; {cure}")
-    new = routed(searches, planner, ends, **options)
-    return new, planner, new.notes
+            return new, among, (f"searched among {which} longer than their best; {cure}",)
+    return routed(searches, planner, ends, **finding), planner, ()
 
 
 def _stays_within(path: Path, position: Array, longer: Array, share: float) -> bool:

@@ -66,6 +66,11 @@ def routed(
     if path.found and path.legs:
         path = replace(path, least=searches.least(path, planner.problem.departure))
     path = replace(path, origin=searches.origin(planner))
+    return exported(path, outputs, **written)
+
+
+def exported(path: Path, outputs: Sequence[str | File], **written: Any) -> Path:
+    """Write a path to route files, and return it with notes on them; `written` are options of `export_path`."""
     check_legs(path, outputs)
     notes: list[str] = []
     for output in outputs:
