@@ -686,7 +686,7 @@ def _measurements(
     columns: Mapping[str, str] | None,
 ) -> "list[Measurements]":
     """Return the measurements in some files."""
-    from .water.mapping.dive_files import read_dives, read_drifters, read_points
+    from .water.mapping.observation_files import read_dives, read_drifters, read_points
 
     kinds = sum(map(bool, (dives, points, drifters)))
     require(kinds > 0, "there are no measurements; give files of dives, points or drifters")
