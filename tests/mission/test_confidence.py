@@ -183,6 +183,7 @@ def test_the_command_chooses_and_looks_at_a_route(folder, capsys, monkeypatch):
         (["--draws", "2", "--best", "mean", "--by", "1"], "leave one out"),
         (["--draws", "9", "--best", "100%"], "must be between 0 % and 100 %; got 100%"),
         (["--draws", "2", "--best", "mean", "-o", "route.txt"], "route.txt"),
+        (["--draws", "2", "--best", "mean", "-o", "route.kml"], "route.kml needs longitude and latitude"),
     ],
 )
 def test_what_is_wrong_is_refused(folder, capsys, monkeypatch, arguments, sentence):
