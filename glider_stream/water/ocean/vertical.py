@@ -45,7 +45,7 @@ def by_continuity(
         f"{float(np.abs(w).max()):.2g} m/s; on half the points it differs by rms {rough:.2g} m/s"
         + _told_bottom(flow, place, seabed, w)
     )
-    return _with(flow, values, flow.levels), text
+    return with_rise(flow, values, flow.levels), text
 
 
 def by_variable(
@@ -71,7 +71,7 @@ def by_variable(
     told = f"vertical current `{name}`, at most {float(np.abs(w).max()):.2g} m/s"
     lacks = int((data.bottom[part] >= 0.0).sum())
     told += f"; {lacks} of {w[0, 0].size} columns hold none, and take their neighbours'" if lacks else ""
-    return _with(flow, values, levels), told
+    return with_rise(flow, values, levels), told
 
 
 _CURE = f'bring them onto one grid first, or choose "{CONTINUITY}"'
@@ -106,7 +106,7 @@ def on_levels(values: Array, levels: Array, at: Array) -> Array:
     return np.asarray((1 - share) * values[:, below] + share * values[:, below + 1])
 
 
-def _with(flow: OceanGrid, values: Array, levels: Array) -> RisingOceanGrid:
+def with_rise(flow: OceanGrid, values: Array, levels: Array) -> RisingOceanGrid:
     """Return a flow with a vertical part, of values (times, levels, ni, nj, 4) [m/s]."""
     level_slot, slots_per_z = slots(levels)
     new = {"values": np.ascontiguousarray(values), "levels": levels, "level_slot": level_slot}
