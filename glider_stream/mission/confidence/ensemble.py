@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid
+from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid, max_rise
 from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
@@ -118,7 +118,11 @@ def _mean(flows: Sequence[Flow]) -> OceanGrid | RisingOceanGrid:
         require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
         total += grid.values
     fastest = max(grid.extent.max_speed for grid in grids)
-    return first._replace(values=total / len(grids), extent=first.extent._replace(max_speed=fastest))
+    values, extent = total / len(grids), first.extent._replace(max_speed=fastest)
+    if isinstance(first, RisingOceanGrid):
+        # a bound as that of the speed: the mean may rise faster than the first member
+        return first._replace(values=values, extent=extent, max_rise=max(max_rise(grid) for grid in grids))
+    return first._replace(values=values, extent=extent)
 
 
 def first_member(files: Sequence[str | Path]) -> list[str]:
