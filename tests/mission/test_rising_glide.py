@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.small import SCENARIO
 
 from glider_stream.kernels.flow import RisingGrid, RisingOceanGrid, currents
 from glider_stream.kernels.place import Place
@@ -14,6 +15,15 @@ from glider_stream.scenario import read_scenario
 from glider_stream.water.analytic import Upwelling
 
 U, V, HEADING = 0.1, 0.2, 0.5
+WAVE = """\
+[flow]
+kind = "internal-wave"
+w = 0.2
+length = 600.0
+depth = 150.0
+period = 900.0
+
+"""
 
 
 def glide(rise, start, depth, w, duration=0.0, speed=0.4):
@@ -58,3 +68,17 @@ def test_a_forecast_errs_in_u_and_v_and_keeps_what_rises(time):
     off, error = currents(flow, x, y, z, t) - currents(true.evaluator.flow, x, y, z, t), field.at(x, y, z, t)
     assert np.abs(off[:, 2]).max() < 1e-12
     assert np.abs(off[:, :2] - error).max() < 0.2 * np.abs(error).max()
+
+
+@pytest.mark.wide
+def test_the_forecast_of_a_wave_is_fine_enough_for_the_wave(tmp_path):
+    text = SCENARIO[SCENARIO.index("[glider]") :]
+    (tmp_path / "wave.toml").write_text(WAVE + text)
+    true = read_scenario(tmp_path / "wave.toml").problem()
+    settings = ForecastError(rms_share=0.3, length_m=200.0, depth_m="all", time_s="steady")
+    field = error_field(settings, np.random.default_rng(5))._replace(scale=0.0)
+    flow = with_error(true, field, settings, 900.0)
+    assert type(flow) is RisingOceanGrid
+    at = np.random.default_rng(1).uniform([-190, -190, -140, 0], [190, 190, -10, 900], (50, 4)).T
+    places = [np.ascontiguousarray(one) for one in at]
+    assert np.abs(currents(flow, *places) - currents(true.evaluator.flow, *places)).max() < 0.012
