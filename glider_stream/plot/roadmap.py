@@ -4,10 +4,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Array, Index
 from ..kernels.flow import Flow
 from ..kernels.terrain import Terrain
+from ..roadmap.store import StoredRoadmap
 from ..water.inspect import is_steady
 from .canvas import INK, colours, frozen, new_figure, styled, thinned, time_text, time_unit, when_text
 from .scene import MAX_NODES, draw_current, draw_space
@@ -17,11 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..roadmap.problem import Problem
-    from ..roadmap.roadmap import BaseRoadmap
+    from ..roadmap.roadmap import Roadmap
 
 MAX_EDGES = 1000
-LARGE = 1 << 21
-"""Of a roadmap of more edges a sample is drawn."""
 PLACES, SUCCESSIVE = 64, 512
 """The sample: so many edges, one after another, at so many places."""
 DIVE, CLIMB = "#3b2a8c", "#f0a04b"
@@ -39,22 +39,24 @@ class _Drawn:
     pairs: int
     all_edges: int
     source: Index
-    target: Index
+    target: NDArray[np.int32]
     time: Array
     glide_angle: Array
     heading: Array
 
     @classmethod
-    def of(cls, road: "BaseRoadmap") -> "_Drawn":
-        """Choose and read the edges; those of a large roadmap at a few places of its file."""
-        count, edges = road.edge_count, np.arange(road.edge_count)
-        if count > LARGE:
-            first = np.linspace(0, count - SUCCESSIVE, PLACES).astype(np.int64)
-            edges = (first[:, None] + np.arange(SUCCESSIVE)).ravel()
+    def of(cls, road: "Roadmap | StoredRoadmap") -> "_Drawn":
+        """Choose the edges, and read those of a roadmap that stays in its file, at a few places of it."""
+        degree, count = np.diff(road.indptr), int(road.indptr[-1])
+        sizes = road.position, degree, sum(road.counts.values()), count
+        if not isinstance(road, StoredRoadmap):
+            source = np.repeat(np.arange(degree.size), degree)
+            return cls(*sizes, source, road.target, road.time, road.glide_angle, road.heading)
+        first = np.linspace(0, max(count - SUCCESSIVE, 0), PLACES).astype(np.int64)
+        edges = np.unique(first[:, None] + np.arange(min(SUCCESSIVE, count)))
         source, target = np.searchsorted(road.indptr, edges, side="right") - 1, road.targets(edges)
         time, _, glide_angle, heading, _, _ = road.legs(edges).T
-        sizes = np.diff(road.indptr), sum(road.counts.values()), count
-        return cls(road.position, *sizes, source, target.astype(np.int64), time, glide_angle, heading)
+        return cls(*sizes, source, target, time, glide_angle, heading)
 
     @property
     def whole(self) -> bool:
@@ -71,13 +73,13 @@ def plot_roadmap(
     flow: Flow,
     terrain: Terrain,
     problem: "Problem",
-    roadmap: "BaseRoadmap",
+    roadmap: "Roadmap | StoredRoadmap",
     depth: float | None = None,
     title: str = "",
 ) -> "Figure":
     """Draw a roadmap: its map at a `depth` [m] (None: the top), degrees of nodes, edge times, controls, counts.
 
-    Of more than LARGE edges a sample is drawn, and titles say so.
+    Of a roadmap that stays in its file a sample is drawn, and titles say so.
 
     Of `problem` the box `lo`, `hi` [m], the `departure` [s], which is the time of the map, and `to_lonlat` are
     read.

@@ -8,6 +8,7 @@ from helpers.small import command, scenario_file, strict_json
 import glider_stream
 from glider_stream import planner
 from glider_stream.base.errors import InputError
+from glider_stream.plot import roadmap as drawing
 from glider_stream.roadmap import rows, store
 from glider_stream.roadmap.roadmap import EDGE_FIELDS
 from glider_stream.scenario import scenario_of
@@ -58,7 +59,8 @@ def test_routes_are_the_same_and_only_some_edges_are_read(file, small_blocks, mo
     assert kept.remaining(PAIRS[0][1]).tobytes() == undirected.remaining(PAIRS[0][1]).tobytes()
 
 
-def test_an_opened_roadmap_answers_all_questions(file, small_blocks):
+def test_an_opened_roadmap_answers_all_questions(file, small_blocks, monkeypatch):
+    monkeypatch.setattr(drawing, "SUCCESSIVE", 10)
     kept, whole = glider_stream.open(file), glider_stream.open(planner.info(file))
     assert isinstance(kept.searches.source, store.StoredRoadmap)
     assert str(kept) == str(whole)
@@ -68,6 +70,9 @@ def test_an_opened_roadmap_answers_all_questions(file, small_blocks):
     for options in ({}, {"surfacing": rule}, {"polish": True}, {"thin": 20.0}, {"within": 0.05}):
         answers = [road.query(*PAIRS[0], **options).as_dict() for road in (kept, whole)]
         assert answers[0]["legs"] == answers[1]["legs"]
+    texts = [text.get_text() for text in kept.plot().findobj(match=lambda one: hasattr(one, "get_text"))]
+    assert "(d) How one steers, of 640 sampled edges" in texts
+    assert "Edges sampled, for all below" in texts
     assert kept.roadmap.time.tobytes() == whole.roadmap.time.tobytes()
 
 
