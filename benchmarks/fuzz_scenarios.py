@@ -32,7 +32,7 @@ from glider_stream.roadmap.slices import SlicedRoadmap
 from glider_stream.roadmap.store import read_any_roadmap, stored_roadmap
 from glider_stream.roadmap.verify import MOST_OFF, replayed_misses
 from glider_stream.scenario import scenario_from_table
-from glider_stream.search.answer import clock_planner, planner_of
+from glider_stream.search.answer import planner_of, planner_on_demand
 from glider_stream.search.query import Planner
 from glider_stream.search.surfacing import Surfacing
 from glider_stream.water.inspect import is_steady
@@ -236,7 +236,7 @@ def flown_wrong(problem, road):
 def clock_wrong(problem, road, number):
     """Whether a route with the clock running misses its goal, or the roadmap's file gives another one."""
     dice, whole = np.random.default_rng(number), planner_of(problem, road, Surfacing())
-    by_file = clock_planner(problem, stored_roadmap(road.file), Surfacing())
+    by_file = planner_on_demand(problem, stored_roadmap(road.file), Surfacing())
     start, goals = int(dice.integers(len(road.position))), dice.integers(len(road.position), size=2)
     for goal in goals:
         ends = road.position[start], road.position[goal]

@@ -12,7 +12,7 @@ from .mission.confidence.judged import Criterion
 from .mission.settings import Mission, read_mission
 from .pilot.export import check_export, export_path
 from .search.flown_on import check_plan
-from .search.path import Path, load_path
+from .search.path import Path, check_frame, load_path
 
 Best = float | str
 """A share, 0.9 for the time by which 90 % arrive; "mean"; or "by" for most arrivals by a time."""
@@ -72,6 +72,7 @@ def _between(ensemble: Ensemble, routes: Sequence[tuple[str, Path]]) -> Ensemble
     name, path = routes[0]
     forecast = ensemble.forecast
     for other, route in routes:
+        check_frame("" if route.origin is None else route.origin.scenario, forecast, other)
         for mine, theirs, end in ((path.start, route.start, "start"), (path.goal, route.goal, "goal")):
             off = float(np.linalg.norm(mine - theirs))
             require(

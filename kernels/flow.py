@@ -18,6 +18,9 @@ from .interpolate import pair_between, row_between
 JUST_BELOW = 1.0 - 2.0**-52
 """A factor just below 1: it puts the last point of a grid into the cell before that point."""
 
+ROUNDING = 1e-9
+"""A quick look at a whole box is this much stricter, in grid indices, than looks at its places, which are rounded."""
+
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
 Numbers = NDArray[np.int64]
@@ -332,6 +335,34 @@ def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
     return pair_between(index_map, (p, q), (a, b))
 
 
+@kernel
+def index_ranges(index_map, x_lo, x_hi, y_lo, y_hi, from_x, from_y, per_x, per_y):
+    """Return the least and greatest fractional indices in a box [m]: i_lo, i_hi, j_lo, j_hi; see `grid_index`.
+
+    Between the map's points the indices are bilinear, so they are greatest and least at corners of the pieces into
+    which these points cut the box.
+    """
+    p_last, q_last = index_map.shape[0] - 1.0, index_map.shape[1] - 1.0
+    p_lo, p_hi = min(max((x_lo - from_x) * per_x, 0.0), p_last), min(max((x_hi - from_x) * per_x, 0.0), p_last)
+    q_lo, q_hi = min(max((y_lo - from_y) * per_y, 0.0), q_last), min(max((y_hi - from_y) * per_y, 0.0), q_last)
+    i_lo, i_hi, j_lo, j_hi = math.inf, -math.inf, math.inf, -math.inf
+    at_p, next_p = p_lo, math.floor(p_lo) + 1.0
+    while True:
+        p, a = _cell(at_p, index_map.shape[0])
+        at_q, next_q = q_lo, math.floor(q_lo) + 1.0
+        while True:
+            q, b = _cell(at_q, index_map.shape[1])
+            i, j = pair_between(index_map, (p, q), (a, b))
+            i_lo, i_hi, j_lo, j_hi = min(i_lo, i), max(i_hi, i), min(j_lo, j), max(j_hi, j)
+            if at_q >= q_hi:
+                break
+            at_q, next_q = min(next_q, q_hi), next_q + 1.0
+        if at_p >= p_hi:
+            break
+        at_p, next_p = min(next_p, p_hi), next_p + 1.0
+    return i_lo, i_hi, j_lo, j_hi
+
+
 def _ocean_grid(flow, x, y, z, t):
     values = flow.values
     at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
@@ -340,6 +371,15 @@ def _ocean_grid(flow, x, y, z, t):
     k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
     n, d = _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
     return pair_between(values, (n, k, i, j), (d, c, a, b))
+
+
+def _one_time_of_ocean_grid(flow, x, y, z):
+    values = flow.values
+    at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
+    i, a = _cell(at_i, values.shape[2])
+    j, b = _cell(at_j, values.shape[3])
+    k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
+    return pair_between(values, (np.uintp(0), k, i, j), (c, a, b))
 
 
 def _upwelling(flow, x, y, z, t):
@@ -404,13 +444,24 @@ def _in_ocean_grid(flow, x, y, t):
 
 
 def _box_in_box(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
-    known = flow.extent
+    return _in_extent(flow.extent, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
+
+
+@kernel
+def _in_extent(known, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
     across = known.x_lo <= x_lo and x_hi <= known.x_hi and known.y_lo <= y_lo and y_hi <= known.y_hi
     return across and known.t_lo <= t_lo and t_hi <= known.t_hi
 
 
-def _unsure(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
-    return False
+def _box_in_ocean_grid(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+    known = flow.extent
+    if not _in_extent(known, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+        return False
+    i_lo, i_hi, j_lo, j_hi = index_ranges(
+        flow.index_map, x_lo, x_hi, y_lo, y_hi, known.x_lo, known.y_lo, flow.per_x, flow.per_y
+    )
+    i_last, j_last = flow.values.shape[2] - 1 - ROUNDING, flow.values.shape[3] - 1 - ROUNDING
+    return ROUNDING <= i_lo and i_hi <= i_last and ROUNDING <= j_lo and j_hi <= j_last
 
 
 def _steady_carry(flow, z):
@@ -432,6 +483,14 @@ def _yes(flow):
 
 def _no(flow):
     return False
+
+
+def _is_of_one_time(flow):
+    return flow.extent.t_lo == -math.inf
+
+
+def _at_no_time(flow, x, y, z):
+    return velocity(flow, x, y, z, 0.0)
 
 
 def _no_rise(flow):
@@ -478,6 +537,8 @@ class Abilities(NamedTuple):
     current: Callable[..., Any] = _level_current
     rises: Callable[..., Any] = _no
     max_rise: Callable[..., Any] = _no_rise
+    has_one_time: Callable[..., Any] = _no
+    at_one_time: Callable[..., Any] = _at_no_time
 
 
 def _rising(current: Callable[..., Any], **others: Callable[..., Any]) -> Abilities:
@@ -493,13 +554,20 @@ ABILITIES: dict[type, Abilities] = {
     Jet: Abilities(_jet),
     TidalJet: Abilities(_tidal_jet, cycle=_tidal_cycle),
     Grid: Abilities(_grid, carry=_grid_carry),
-    OceanGrid: Abilities(_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle),
+    OceanGrid: Abilities(
+        _ocean_grid,
+        contains=_in_ocean_grid,
+        contains_box=_box_in_ocean_grid,
+        cycle=_ocean_cycle,
+        has_one_time=_is_of_one_time,
+        at_one_time=_one_time_of_ocean_grid,
+    ),
     Upwelling: _rising(_upwelling),
     Rolls: _rising(_rolls, cycle=_rolls_cycle),
     Abc: _rising(_abc),
     RisingGrid: _rising(_rising_grid),
     RisingOceanGrid: _rising(
-        _rising_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle
+        _rising_ocean_grid, contains=_in_ocean_grid, contains_box=_box_in_ocean_grid, cycle=_ocean_cycle
     ),
 }
 
@@ -524,6 +592,16 @@ def max_rise(flow: Flow) -> float:
     return ABILITIES[type(flow)].max_rise(flow)
 
 
+def has_one_time(flow: Flow) -> bool:
+    """Return whether the flow comes from a file of one time, so that `at_one_time` reads it faster."""
+    return ABILITIES[type(flow)].has_one_time(flow)
+
+
+def at_one_time(flow: Flow, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return `velocity` of a flow that `has_one_time`: the same bits, without its times."""
+    return ABILITIES[type(flow)].at_one_time(flow, x, y, z)
+
+
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
     """Return whether the flow is known at (x, y) [m] and time t [s]."""
     return ABILITIES[type(flow)].contains(flow, x, y, t)
@@ -545,7 +623,7 @@ def carry(flow: Flow, z: float) -> float:
     return ABILITIES[type(flow)].carry(flow, z)
 
 
-for _ability in (velocity, current, rises, max_rise, contains, contains_box, carry):
+for _ability in (velocity, current, rises, max_rise, contains, contains_box, carry, has_one_time, at_one_time):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
 
 

@@ -23,7 +23,7 @@ from .edges import (
     store,
 )
 from .fan import FAN_ROWS, Launch, Sweep, fan_guesses, outward_of
-from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, widen
+from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, stayed_open, widen
 from .flow import Array, Numbers, contains, rises
 from .motion import LANES, is_clear, stays_inside
 from .patch import (
@@ -136,7 +136,8 @@ def checked_leg(medium, lanes, n):
         return no_edge(NO_HIT)
     if not (stayed_inside(flow, lanes, n, start.t, time) or stays_inside(flow, start, c, time, dt)):
         return no_edge(NO_HIT)
-    if not is_clear(flow, medium.terrain, start, c, time, dt, CLEARANCE_SPACING):
+    open_water = stayed_open(flow, medium.terrain, lanes, n, start.z, start.z + c.w * time)
+    if not (open_water or is_clear(flow, medium.terrain, start, c, time, dt, CLEARANCE_SPACING)):
         return no_edge(BLOCKED)
     return Edge(
         CONNECTED, time, edge_cost(medium.cost, time), c.glide_angle, c.heading, c.speed, lanes[AIM_MISS, n]

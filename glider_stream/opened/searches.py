@@ -15,7 +15,7 @@ from ..roadmap.roadmap import EdgeTable, Roadmap
 from ..roadmap.slices import SlicedRoadmap
 from ..roadmap.store import StoredRoadmap
 from ..scenario import Scenario, scenario_of
-from ..search.answer import Ends, clock_planner, planner_of
+from ..search.answer import Ends, planner_of, planner_on_demand
 from ..search.assembly import RoutePlanner
 from ..search.departures import Moment, seconds
 from ..search.least_time import GreatestSpeeds, least_cost
@@ -95,8 +95,10 @@ class Searches:
 
     def _planner_of(self, problem: Problem, rule: Surfacing) -> RoutePlanner:
         source = self.source
-        if isinstance(source, StoredRoadmap) and not problem.frozen and not is_steady(problem.evaluator.flow):
-            return clock_planner(problem, source, rule)
+        if isinstance(source, StoredRoadmap):
+            planner = planner_on_demand(problem, source, rule)
+            if planner is not None:
+                return planner
         return planner_of(problem, self.road, rule, self.position if source is None else None)
 
     def leaving(self, depart: Moment | None, surfacing: Surfacing | None = None) -> RoutePlanner:
@@ -107,7 +109,7 @@ class Searches:
         if since == 0.0 or (changes and not problem.frozen):
             planner = self.planner(surfacing)
             return planner.leaving(since) if since else planner
-        fits = not (changes and isinstance(self.road, Roadmap))
+        fits = not changes or self.source is None or self.source.departures is not None
         legs = f"frozen paths over this roadmap leave at {problem.departure:g} s"
         require(fits, f"{legs}; got {depart}; leave `query.frozen` out, or build it with that `query.departure`")
         return self._planner_of(problem.leaving(since), self.surfacing if surfacing is None else surfacing)

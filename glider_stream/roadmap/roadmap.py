@@ -1,10 +1,11 @@
 """The roadmap: nodes, the legs between them, and what made it."""
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Index
 from ..kernels.edges import Status
 from .inputs import settings_sha256
+from .rows import Blend, EdgeRows
 
 EDGE_FIELDS = ("time", "cost", "glide_angle", "heading", "speed", "miss")
 
@@ -162,8 +164,83 @@ EMPTY = (
 """The shapes and types of the arrays of `Edges` without any node."""
 
 
+class BaseRoadmap(ABC):
+    """What a roadmap tells of itself and of some of its edges, in memory or in its file."""
+
+    position: Array
+    indptr: Index
+    counts: dict[str, int]
+    provenance: Provenance
+    wall_s: float
+    threads: int
+
+    @abstractmethod
+    def rows(self, blend: Blend) -> EdgeRows:
+        """Return the edges for a search that makes a sum least."""
+
+    @abstractmethod
+    def targets(self, edges: Index) -> NDArray[np.int32]:
+        """Return the targets of some edges (n,)."""
+
+    @abstractmethod
+    def legs(self, edges: Index) -> Array:
+        """Return the values (n, 6) of some edges (n,), in the order of EDGE_FIELDS."""
+
+    @property
+    def edge_count(self) -> int:
+        """The number of edges."""
+        return int(self.indptr[-1])
+
+    @property
+    def evaluated(self) -> int:
+        """The number of pairs that were evaluated."""
+        return sum(self.counts.values())
+
+    @property
+    def connected_share(self) -> float:
+        """The number of edges as a share of the pairs that were evaluated."""
+        return self.edge_count / max(self.evaluated, 1)
+
+    @property
+    def pairs_per_s(self) -> float:
+        """The number of pairs evaluated per second of wall time, without compilation."""
+        return self.evaluated / max(self.wall_s, 1e-9)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the table that `info --json` prints."""
+        return {
+            "nodes": len(self.position),
+            "edges": self.edge_count,
+            "evaluated": self.evaluated,
+            "connected_share": self.connected_share,
+            "counts": self.counts,
+            "pairs_per_s": self.pairs_per_s,
+            "wall_s": self.wall_s,
+            "threads": self.threads,
+            **asdict(self.provenance),
+        }
+
+    def _sizes(self) -> str:
+        """Return how much the roadmap holds, for the first line of its text."""
+        return f"{len(self.position):,} nodes, {self.edge_count:,} edges"
+
+    def __str__(self) -> str:
+        others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
+        steps = f"  steps:  {self.provenance.steps}\n" if self.provenance.steps else ""
+        return (
+            f"Roadmap: {self._sizes()}\n"
+            f"  pairs:  {self.evaluated:,} evaluated, {self.connected_share:.1%} connected ({others})\n"
+            f"  flow:   {self.provenance.flow}\n"
+            f"  glider: {self.provenance.glider}\n{steps}"
+            f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
+            f"{self.provenance.created}\n"
+            f"  by:     glider-stream {self.provenance.software_version}"
+            + "".join(f", {text}" for text in (self.provenance.libraries, self.provenance.machine) if text)
+        )
+
+
 @dataclass(frozen=True)
-class EdgeTable:
+class EdgeTable(BaseRoadmap):
     """Nodes, and edges in CSR form: what roadmaps of one departure and of several have in common."""
 
     position: Array
@@ -183,52 +260,21 @@ class EdgeTable:
     file: Path | None = field(default=None, compare=False)
     elsewhere: tuple[str, ...] = field(default=(), compare=False)
 
-    @property
-    def evaluated(self) -> int:
-        """The number of pairs that were evaluated."""
-        return sum(self.counts.values())
+    def whole(self) -> Self:
+        """Return the roadmap with all its edges: itself."""
+        return self
 
-    @property
-    def connected_share(self) -> float:
-        """The number of edges as a share of the pairs that were evaluated."""
-        return self.target.size / max(self.evaluated, 1)
+    def rows(self, blend: Blend) -> EdgeRows:
+        """Return the edges for a search that makes a sum least."""
+        return EdgeRows.whole(self.indptr, self.target, blend.read(lambda name: getattr(self, name)))
 
-    @property
-    def pairs_per_s(self) -> float:
-        """The number of pairs evaluated per second of wall time, without compilation."""
-        return self.evaluated / max(self.wall_s, 1e-9)
+    def targets(self, edges: Index) -> NDArray[np.int32]:
+        """Return the targets of some edges (n,)."""
+        return self.target[edges]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the table that `info --json` prints."""
-        return {
-            "nodes": len(self.position),
-            "edges": self.target.size,
-            "evaluated": self.evaluated,
-            "connected_share": self.connected_share,
-            "counts": self.counts,
-            "pairs_per_s": self.pairs_per_s,
-            "wall_s": self.wall_s,
-            "threads": self.threads,
-            **asdict(self.provenance),
-        }
-
-    def _sizes(self) -> str:
-        """Return how much the roadmap holds, for the first line of its text."""
-        return f"{len(self.position):,} nodes, {self.target.size:,} edges"
-
-    def __str__(self) -> str:
-        others = ", ".join(f"{n:,} {name.replace('_', ' ')}" for name, n in self.counts.items() if n)
-        steps = f"  steps:  {self.provenance.steps}\n" if self.provenance.steps else ""
-        return (
-            f"Roadmap: {self._sizes()}\n"
-            f"  pairs:  {self.evaluated:,} evaluated, {self.connected_share:.1%} connected ({others})\n"
-            f"  flow:   {self.provenance.flow}\n"
-            f"  glider: {self.provenance.glider}\n{steps}"
-            f"  built:  {self.wall_s:.1f} s on {self.threads} threads, {self.pairs_per_s:,.0f} pairs/s, "
-            f"{self.provenance.created}\n"
-            f"  by:     glider-stream {self.provenance.software_version}"
-            + "".join(f", {text}" for text in (self.provenance.libraries, self.provenance.machine) if text)
-        )
+    def legs(self, edges: Index) -> Array:
+        """Return the values (n, 6) of some edges (n,), in the order of EDGE_FIELDS."""
+        return np.column_stack([getattr(self, name)[edges] for name in EDGE_FIELDS])
 
 
 @dataclass(frozen=True)
@@ -250,4 +296,5 @@ class Roadmap(EdgeTable):
         True
     """
 
+    departures: ClassVar[None] = None
     node_counts: NDArray[np.int32] | None = field(default=None, kw_only=True)

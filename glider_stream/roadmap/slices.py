@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from .roadmap import EDGE_FIELDS, EdgeTable, Roadmap
-from .rows import EdgeRows
 
 
 def rows_of(nodes: Index, slices: int) -> Index:
@@ -33,11 +32,6 @@ class SlicedRoadmap(EdgeTable):
 
     departures: Array = field(kw_only=True)
     row_counts: NDArray[np.int32] | None = field(default=None, kw_only=True)
-
-    @property
-    def rows(self) -> EdgeRows:
-        """The targets and times of all edges."""
-        return EdgeRows.whole(self.indptr, self.target, self.time)
 
     def at(self, number: int) -> Roadmap:
         """Return one slice as a roadmap."""

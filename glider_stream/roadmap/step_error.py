@@ -10,7 +10,7 @@ from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..kernels.edges import CONNECTED, Edge
 from .problem import Problem
-from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap, in_order
+from .roadmap import BaseRoadmap, Edges, Provenance, in_order
 
 SAMPLED_NODES, SAMPLED_LEGS = 16, 512
 """At most this many nodes, evenly chosen by their numbers, and at most this many of their legs are flown
@@ -67,12 +67,17 @@ def wider_samples(count: int) -> Iterator[Index]:
     yield sampled_nodes(count, min(count, MOST_SAMPLED_NODES))
 
 
+def sampled_legs(count: int) -> Index:
+    """Return the legs, of `count`, that are flown again."""
+    return np.unique(np.linspace(0, count - 1, min(SAMPLED_LEGS, count)).astype(np.int64))
+
+
 def step_error(problem: Problem, start: Array, values: Array) -> StepError:
     """Return the step error of some legs from `start` (n, 3) [m]; `values` (n, 6) in the order of EDGE_FIELDS."""
     evaluator = problem.evaluator
     integration = evaluator.integration
     finer = replace(evaluator, integration=replace(integration, dt=FINER * integration.dt))
-    some = np.unique(np.linspace(0, len(values) - 1, min(SAMPLED_LEGS, len(values))).astype(np.int64))
+    some = sampled_legs(len(values))
     off = 0.0
     for n in some:
         leg = Edge(CONNECTED, *(float(value) for value in values[n]))
@@ -130,10 +135,10 @@ class StepSample:
         return edges
 
 
-def check_steps(roadmap: Roadmap, problem: Problem) -> None:
+def check_steps(roadmap: BaseRoadmap, problem: Problem) -> None:
     """Raise InputError if the steps of a roadmap are too coarse, unless its build has checked them."""
     if roadmap.provenance.steps and UNTRIED not in roadmap.provenance.steps:
         return
-    degree = np.diff(roadmap.indptr)
-    start = np.repeat(roadmap.position, degree, axis=0)
-    step_error(problem, start, np.column_stack([getattr(roadmap, name) for name in EDGE_FIELDS])).check()
+    some = sampled_legs(roadmap.edge_count)
+    source = np.searchsorted(roadmap.indptr, some, side="right") - 1
+    step_error(problem, roadmap.position[source], roadmap.legs(some)).check()

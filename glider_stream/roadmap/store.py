@@ -6,6 +6,7 @@ import io
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,8 @@ from ..base.terminal import plain
 from ..base.untrusted import check_claim, check_file, check_links
 from ..kernels.edges import Status
 from .builder import Tally
-from .roadmap import EDGE_FIELDS, Edges, Provenance, Roadmap
-from .rows import EdgeRows, Span
+from .roadmap import EDGE_FIELDS, BaseRoadmap, Edges, Provenance, Roadmap
+from .rows import Blend, EdgeRows, Span
 from .shard import Part, Shard
 from .slices import SlicedRoadmap
 
@@ -266,16 +267,12 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
         _with_every_status(arrays)
         _check_edges(arrays, len(arrays["nodes/position"]) * slices, path)
         wall, used = _effort(file, path)
-        pairs = file["pairs"].attrs
-        counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
-        counted = min(counts.values()) >= 0
-        require(counted, f"the roadmap {path} is damaged: a count of its pairs makes no sense; build it again")
         whole: dict[str, Any] = {
             "position": arrays["nodes/position"],
             "indptr": arrays["edges/indptr"],
             "target": arrays["edges/target"],
             **{name: arrays[f"edges/{name}"] for name in EDGE_FIELDS},
-            "counts": counts,
+            "counts": _counts(file, path),
             "provenance": _provenance(file),
             "wall_s": wall,
             "threads": used,
@@ -290,17 +287,20 @@ def read_any_roadmap(path: str | Path) -> Roadmap | SlicedRoadmap:
 
 
 @dataclass(frozen=True)
-class StoredRoadmap:
-    """A roadmap that stays in its `file`: its nodes `position` (n, 3) [m], and `rows` of edges, read when needed.
+class StoredRoadmap(BaseRoadmap):
+    """A roadmap that stays in its `file`; nodes `position` (n, 3) [m] and rows `indptr` are in memory.
 
     `departures` (slices,) [s] are those of its slices, None for a roadmap of one departure. `identity` is that of
-    the file when it was opened. `elsewhere`: see `Roadmap`. Damage in a part that is never read is not found.
+    the file when it was opened. Other fields: see `Roadmap`. Damage in a part that is never read is not found.
     """
 
     position: Array
-    departures: Array | None
-    rows: EdgeRows
+    indptr: Index
+    counts: dict[str, int]
     provenance: Provenance
+    wall_s: float
+    threads: int
+    departures: Array | None
     file: Path
     identity: tuple[int, ...]
     elsewhere: tuple[str, ...] = ()
@@ -310,13 +310,47 @@ class StoredRoadmap:
         _check_same(self.file, self.identity)
         return replace(read_any_roadmap(self.file), elsewhere=self.elsewhere)
 
+    def rows(self, blend: Blend) -> EdgeRows:
+        """Return the edges for a search that makes a sum least; they are read when the search needs them."""
+        source = _StoredEdges(self.file, self.identity, len(self.position), blend)
+        return EdgeRows.on_demand(self.indptr, CHUNK, source)
+
+    def targets(self, edges: Index) -> NDArray[np.int32]:
+        """Return the targets of some edges (n,); InputError if they are damaged."""
+        found = self._some("edges/target", edges).astype(np.int32, copy=False)
+        _check_nodes(found, len(self.position), self.file)
+        return found
+
+    def legs(self, edges: Index) -> Array:
+        """Return the values (n, 6) of some edges (n,), in the order of EDGE_FIELDS; InputError if damaged."""
+        return np.column_stack([self._some(f"edges/{name}", edges) for name in EDGE_FIELDS])
+
+    def _some(self, name: str, edges: Index) -> AnyArray:
+        """Return a dataset's values of some edges (n,); each block of the file is read once."""
+        _check_same(self.file, self.identity)  # so its links are checked already
+        order = np.argsort(edges, kind="stable")
+        found = np.empty(edges.size, _DESCRIBED[name][0])
+        with _errors_of(self.file), h5py.File(self.file, "r") as file:
+            dataset = file[name]
+            for some in np.split(order, np.flatnonzero(np.diff(edges[order] // CHUNK)) + 1):
+                if some.size:
+                    first = int(edges[some[0]]) // CHUNK * CHUNK
+                    found[some] = dataset[first : first + CHUNK][edges[some] - first]
+        _check_values(name, found, self.file)
+        return found
+
+
+LARGE = 64 * CHUNK
+"""A roadmap of more edges than this, 100 MB, stays in its file when it is opened."""
+
 
 def opened_roadmap(path: str | Path) -> Roadmap | StoredRoadmap:
-    """Read the file of a roadmap of one departure; a roadmap of several stays in its file."""
+    """Return a roadmap file as queries use it: if it is large or of several departures, it stays in its file."""
     with _reading(Path(path)) as file:
         _check_head(file, Path(path), FORMAT)
         several = int(file.attrs["format_version"]) == SLICED_VERSION
-    return stored_roadmap(path) if several else read_roadmap(path)
+        large = _declared(file, Path(path), "edges/target").size > LARGE
+    return stored_roadmap(path) if several or large else read_roadmap(path)
 
 
 def stored_roadmap(path: str | Path) -> StoredRoadmap:
@@ -333,9 +367,8 @@ def stored_roadmap(path: str | Path) -> StoredRoadmap:
         for name in EDGE_FIELDS:
             fits = _declared(file, path, f"edges/{name}").shape == edges
             require(fits, f"the roadmap {path} is damaged: its datasets do not fit each other; build it again")
-        identity = _identity(path)
-        rows = EdgeRows.on_demand(indptr, CHUNK, _StoredEdges(path, identity, len(position)))
-        return StoredRoadmap(position, departures, rows, _provenance(file), path, identity)
+        made = _counts(file, path), _provenance(file), *_effort(file, path)
+        return StoredRoadmap(position, indptr, *made, departures, path, _identity(path))
     raise AssertionError  # never reached, because _reading raises
 
 
@@ -346,24 +379,33 @@ class _StoredEdges:
     path: Path
     identity: tuple[int, ...]
     nodes: int
+    blend: Blend
 
-    def read(self, spans: Sequence[Span], target: NDArray[np.int32], time: Array) -> None:
-        """Read targets and times of some spans; InputError if the file is another one by now."""
+    def read(self, spans: Sequence[Span], target: NDArray[np.int32], weight: Array) -> None:
+        """Read targets and weights of some spans; InputError if the file is another one by now."""
         _check_same(self.path, self.identity)  # so its links are checked already
         with _errors_of(self.path), h5py.File(self.path, "r") as file:
             for first, last in spans:
                 target[first:last] = file["edges/target"][first:last]
-                time[first:last] = file["edges/time"][first:last]
+                weight[first:last] = self.blend.read(partial(self._column, file, slice(first, last)))
 
-    def check(self, span: Span, indptr: Index, target: NDArray[np.int32], time: Array) -> None:
-        """Raise InputError unless the targets are nodes that rise within a row, and times are at least 0."""
-        some = slice(*span)
-        _check_values("edges/time", time[some], self.path)
-        to = target[some]
-        nodes = to.size == 0 or bool(to.min() >= 0 and to.max() < self.nodes)
-        require(nodes, f"the roadmap {self.path} is damaged: a target is no node; build it again")
+    def _column(self, file: h5py.File, some: slice, name: str) -> Array:
+        values: Array = file[f"edges/{name}"][some]
+        _check_values(f"edges/{name}", values, self.path)
+        return values
+
+    def check(self, span: Span, indptr: Index, target: NDArray[np.int32], weight: Array) -> None:
+        """Raise InputError unless the targets are nodes that rise within a row."""
+        to = target[slice(*span)]
+        _check_nodes(to, self.nodes, self.path)
         begins = indptr[np.searchsorted(indptr, span[0]) : np.searchsorted(indptr, span[1])] - span[0]
         _check_rises(to, begins, self.path)
+
+
+def _check_nodes(target: NDArray[np.int32], nodes: int, path: Path) -> None:
+    """Raise InputError unless targets are among so many nodes."""
+    among = target.size == 0 or bool(target.min() >= 0 and target.max() < nodes)
+    require(among, f"the roadmap {path} is damaged: a target is no node; build it again")
 
 
 def _identity(path: Path) -> tuple[int, ...]:
@@ -543,6 +585,15 @@ def _check_rises(target: AnyArray, begins: AnyArray, path: Path) -> None:
     rises = target[1:] > target[:-1]
     rises[begins[(begins > 0) & (begins < target.size)] - 1] = True
     require(bool(rises.all()), f"the roadmap {path} is damaged: its targets do not rise; build it again")
+
+
+def _counts(file: h5py.File, path: Path) -> dict[str, int]:
+    """Return the number of pairs by the name of their status."""
+    pairs = file["pairs"].attrs
+    counts = {status.name.lower(): int(pairs.get(status.name.lower(), 0)) for status in Status}
+    counted = min(counts.values()) >= 0
+    require(counted, f"the roadmap {path} is damaged: a count of its pairs makes no sense; build it again")
+    return counts
 
 
 def _effort(file: h5py.File, path: Path) -> tuple[float, int]:

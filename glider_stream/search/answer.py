@@ -61,12 +61,15 @@ def planner_of(
     return Planner(roadmap, problem) if rule == Surfacing() else SurfacingPlanner(roadmap, problem, rule)
 
 
-def clock_planner(problem: Problem, roadmap: StoredRoadmap, rule: Surfacing) -> ClockPlanner:
-    """Return the planner with the clock running for a roadmap that stays in its file: by slices, or by nodes."""
-    if roadmap.departures is not None:
-        return SlicePlanner(problem, SliceSearch(roadmap, problem), rule)
-    check_unchanged(roadmap, problem)
-    return ClockPlanner(problem, roadmap.position, rule)
+def planner_on_demand(problem: Problem, roadmap: StoredRoadmap, rule: Surfacing) -> RoutePlanner | None:
+    """Return the planner for a roadmap that stays in its file; None if all its edges are needed."""
+    if not is_steady(problem.evaluator.flow) and not problem.frozen:
+        if roadmap.departures is not None:
+            return SlicePlanner(problem, SliceSearch(roadmap, problem), rule)
+        check_unchanged(roadmap, problem)
+        return ClockPlanner(problem, roadmap.position, rule)
+    whole = roadmap.departures is not None or rule != Surfacing()
+    return None if whole else Planner(roadmap, problem)
 
 
 def _slice_of(roadmap: SlicedRoadmap, departure: float) -> Roadmap:

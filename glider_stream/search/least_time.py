@@ -15,7 +15,9 @@ from scipy.ndimage import map_coordinates, maximum_filter
 
 from ..base.arrays import Array, Index
 from ..kernels import flow as kernel
+from ..kernels.cheapest import Ahead
 from ..kernels.control import CLIMB, DIVE, Polar
+from ..kernels.cost import CostRates
 from ..roadmap.problem import Problem
 from ..vehicle.cost import Cost
 
@@ -28,6 +30,11 @@ SLOWEST = 1e-6
 """The least speed [m/s] that the bound assumes across a line that no glider can pass."""
 SPARE = 0.02
 """The current between the points at which a formula is read may be higher by this share of the greatest speed."""
+
+BESIDE = 0.02
+"""A leg may end a little beside its target. This saves at most this share of its time."""
+NOTHING_AHEAD = Ahead(np.empty((2, 0)), np.empty(0), 1.0, np.empty((0, 0)), np.empty(0), 0.0, math.inf, 0.0, 0.0)
+"""The bound that says nothing."""
 
 
 def fastest_sink(polar: Polar, flow: kernel.Flow) -> float:
@@ -79,6 +86,19 @@ class GreatestSpeeds:
         """Return the potentials (n, directions) [s] of places (n, 3) [m]; outside the water they are constant."""
         along = places[:, :2] @ self.directions
         return np.stack([np.interp(along[:, n], *scale) for n, scale in enumerate(self.scales)], axis=1)
+
+    def ahead(self, goal: Array, rates: CostRates) -> Ahead:
+        """Return the bound of the way to a goal (3,) [m], for a search over legs that may end BESIDE targets."""
+        firsts = np.array([places[0] for places, _ in self.scales])
+        most = max(time.size for _, time in self.scales)
+        padded = np.stack([np.pad(time, (0, most - time.size), "edge") for _, time in self.scales])
+        size = float(self.scales[0][0][1] - firsts[0])
+        goals = self.potentials(goal[None])[0]
+        share = 1.0 - BESIDE
+        height, per_second = float(goal[2]), share * float(rates.per_second)
+        return Ahead(
+            self.directions, firsts, size, padded, goals, height, self.sink, per_second, float(rates.per_leg)
+        )
 
 
 def least_cost(speeds: GreatestSpeeds, start: Array, goal: Array, cost: Cost) -> float:

@@ -1,34 +1,43 @@
-"""Queries: Dijkstra's algorithm over a roadmap, with a start and a goal attached to it."""
+"""Queries: the cheapest ways over a roadmap, with a start and a goal attached to it."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from threading import Lock
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Index
+from ..kernels.cheapest import Ahead, Rows, cheapest_ways
+from ..kernels.cost import CostRates
 from ..kernels.edges import COST, GLIDE_ANGLE, STATUS, TIME, Edge, Status, edge_of
 from ..roadmap.pairs import Attached, LegFinder
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
-from ..roadmap.roadmap import EDGE_FIELDS, Roadmap
+from ..roadmap.roadmap import Roadmap
+from ..roadmap.rows import CHEAPEST, FASTEST, Blend, EdgeRows, coming
+from ..roadmap.slices import SlicedRoadmap
 from ..roadmap.step_error import check_steps
+from ..roadmap.store import StoredRoadmap
 from .assembly import RoutePlanner, nodes_at, placed_end
 from .expansion import Fan
 from .labels import Aim, LabelSearch
-from .least_time import fastest_sink
+from .least_time import NOTHING_AHEAD, GreatestSpeeds, fastest_sink
 from .path import Hop, Path
 from .surfacing import Surfacing
 from .trade_off import LeftInRoadmap, RoadmapEnds, RoadmapExpansion, TradeOff
 from .why_not import why_not
 
 NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
+MOST_KEPT = 2
+"""The edges of this many blends are kept: as a rule the scenario's cost, and time."""
+FAR = 20_000
+"""With fewer nodes a bound of what remains to the goal takes longer than it saves."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +50,6 @@ class End:
 
 
 @dataclass(frozen=True)
-class Blend:
-    """The sum that a search makes least: `cost` times the scenario's cost, plus `time` times the seconds."""
-
-    cost: float = 1.0
-    time: float = 0.0
-
-    def of(self, cost: Any, time: Any) -> Any:
-        """Return the sum for legs with these costs and times [s]."""
-        if self == Blend():
-            return cost  # most queries use this case, for all edges
-        return self.cost * cost + self.time * time
-
-
-@dataclass(frozen=True)
 class _Search:
     """The cheapest ways from a start: the cost and the predecessor `before` of every state.
 
@@ -64,9 +59,10 @@ class _Search:
 
     start: End
     blend: Blend
+    rows: EdgeRows
     origin: int
     cost: Array
-    before: NDArray[np.int32]
+    before: Index
 
 
 class Planner(RoutePlanner):
@@ -80,23 +76,34 @@ class Planner(RoutePlanner):
 
     def __init__(
         self,
-        roadmap: Roadmap,
+        roadmap: Roadmap | StoredRoadmap,
         problem: Problem,
         rule: Surfacing = Surfacing(),  # noqa: B008  (frozen)
     ) -> None:
-        """Check that the roadmap was built with the problem's flow, terrain and glider."""
+        """Check that the roadmap was built with the problem's flow, terrain and glider.
+
+        Of a roadmap of one departure that stays in its file, the edges are read that a search comes to; the
+        routes are the same.
+        """
         check_unchanged(roadmap, problem)
         check_steps(roadmap, problem)
-        self.roadmap = roadmap
+        self._source, self.position = roadmap, roadmap.position
         super().__init__(problem, rule, frozen=True)
-        self._kept: tuple[Blend, Array] | None = None
+        self._kept: dict[Blend, EdgeRows] = {}
         self._turn_by_turn = Lock()
+
+    @cached_property
+    def roadmap(self) -> Roadmap:
+        """The roadmap with all its edges; if it stayed in its file, it is read now."""
+        whole = self._source.whole()
+        assert not isinstance(whole, SlicedRoadmap)
+        return whole
 
     def query(
         self,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
-        blend: Blend = Blend(),
+        blend: Blend = CHEAPEST,
     ) -> Path:
         """Return the cheapest path between two points (3,) [m]; None stands for the scenario's start or goal.
 
@@ -113,19 +120,18 @@ class Planner(RoutePlanner):
         self,
         start: ArrayLike | None,
         goals: Sequence[ArrayLike | None],
-        blend: Blend = Blend(),
+        blend: Blend = CHEAPEST,
     ) -> list[Path]:
         """Return the cheapest paths from one point (3,) [m] to each of many, as `query` does, by one search."""
-        search = self._search(self._start(start), blend)
         ends = [self._goal(goal) for goal in goals]
+        search = self._search(self._start(start), blend, ends)
         direct = self._direct(search.start, ends)
         return [self._way(search, end, leg) for end, leg in zip(ends, direct, strict=True)]
 
     def arrivals(self, start: ArrayLike | None = None) -> Array:
         """Return the earliest time (n,) [s] at which each node is reached from a point; inf if it never is."""
-        search = self._search(self._start(start), Blend(0.0, 1.0))
-        nodes = len(self.roadmap.position)
-        return np.asarray(search.cost[: self._phases * nodes].reshape(nodes, self._phases).min(axis=1))
+        search = self._search(self._start(start), FASTEST)
+        return np.asarray(search.cost.reshape(-1, self._phases).min(axis=1))
 
     def remaining(self, goal: ArrayLike | None = None) -> Array:
         """Return the least time (n,) [s] from each node to a point; inf if no way leads there."""
@@ -166,7 +172,7 @@ class Planner(RoutePlanner):
 
     def _reached(self, start: Array) -> tuple[Array, Array]:
         """Return the nodes' positions (n, 3) [m], and the earliest time (n,) [s] at which each is reached."""
-        return self.roadmap.position, self.arrivals(start)
+        return self.position, self.arrivals(start)
 
     def within(self, start: ArrayLike | None, goal: ArrayLike | None, most_cost: float) -> Path:
         """Return the fastest path that costs at most `most_cost`; if no path does, it says why."""
@@ -181,31 +187,31 @@ class Planner(RoutePlanner):
         ends = [self._goal(goal) for goal in goals]
         costs = np.empty((len(starts), len(goals)))
         for row, start in zip(costs, starts, strict=True):
-            search = self._search(self._start(start), Blend())
+            search = self._search(self._start(start), CHEAPEST, ends)
             for m, (end, leg) in enumerate(zip(ends, self._direct(search.start, ends), strict=True)):
                 here = np.array_equal(search.start.point, end.point)
                 row[m] = 0.0 if here else min(self._through(search, end)[0], self._alone(search, leg))
         return costs
 
-    @property
+    @cached_property
     def _turns(self) -> Array | None:
         """The cost (n,) of a turn from dive to climb at each node; None if turns are free."""
-        return self.problem.evaluator.cost.inflection(self.roadmap.position[:, 2])
+        return self.problem.evaluator.cost.inflection(self.position[:, 2])
 
-    def _turn(self, search: _Search, z: float) -> float:
+    def _turn(self, blend: Blend, z: float) -> float:
         cost = self.problem.evaluator.cost.inflection(z)
-        return 0.0 if cost is None else search.blend.cost * float(cost)
+        return 0.0 if cost is None else blend.cost * float(cost)
 
     def _alone(self, search: _Search, leg: Edge) -> float:
         """Return the cost of the direct leg, inf if it does not exist; its start counts as the end of a dive."""
         if leg.status != Status.CONNECTED:
             return math.inf
-        turn = self._turn(search, search.start.point[2]) if leg.glide_angle > 0 else 0.0
+        turn = self._turn(search.blend, search.start.point[2]) if leg.glide_angle > 0 else 0.0
         return float(search.blend.of(leg.cost, leg.time)) + turn
 
     @cached_property
     def _legs(self) -> LegFinder:
-        return self.problem.legs(self.roadmap.position)
+        return self.problem.legs(self.position)
 
     def _start(self, point: ArrayLike | None) -> End:
         nodes, place = self._place(point, self.problem.start, "start")
@@ -218,65 +224,59 @@ class Planner(RoutePlanner):
     def _place(self, point: ArrayLike | None, named: Array | None, name: str) -> tuple[Index, Array]:
         """Return the nodes at an end of the query (often the array is empty), and its position (3,) [m]."""
         place = placed_end(self.problem, point, named, name)
-        return nodes_at(self.roadmap.position, place), place
+        return nodes_at(self.position, place), place
 
-    @cached_property
-    def _graph(self) -> tuple[Index | slice, NDArray[np.int32], NDArray[np.int32], Array | None]:
-        """The graph of states: the edge of each way, its target state, each state's first way, the turn's cost.
-
-        A way costs a turn if it climbs from a state that was reached by a dive. The arrays have room for the ways
-        of one more state, the start.
-        """
-        road, turns, nodes = self.roadmap, self._turns, len(self.roadmap.position)
-        room = np.empty(nodes, np.int32)
-        if turns is None:
-            target = np.concatenate([road.target, room])
-            return slice(None), target, np.append(road.indptr, 0).astype(np.int32), None
-        degree = np.repeat(np.diff(road.indptr), 2)
-        first = np.concatenate([[0], np.cumsum(degree)])
-        ways = np.arange(first[-1]) - np.repeat(first[:-1] - np.repeat(road.indptr[:-1], 2), degree)
-        climbs = road.glide_angle[ways] > 0
-        after_dive = np.repeat(np.arange(degree.size) % 2 == 0, degree)
-        turn = np.where(climbs & after_dive, np.repeat(np.repeat(turns, 2), degree), 0.0)
-        target = np.concatenate([(2 * road.target[ways] + climbs).astype(np.int32), room])
-        return ways, target, np.append(first, 0).astype(np.int32), turn
-
-    def _costs(self, blend: Blend) -> Array:
-        """Return the cost of each way, with room for a start's ways; later queries use the same result."""
-        if self._kept is None or self._kept[0] != blend:
-            ways, _, _, turn = self._graph
-            cost = blend.of(self.roadmap.cost, self.roadmap.time)[ways]
-            cost = cost if turn is None else cost + blend.cost * turn
-            self._kept = blend, np.concatenate([cost, np.empty(len(self.roadmap.position))])
-        return self._kept[1]
+    def _rows(self, blend: Blend) -> EdgeRows:
+        """Return the edges for a search; later queries use the same, and what they have read."""
+        with self._turn_by_turn:
+            if blend not in self._kept:
+                if len(self._kept) == MOST_KEPT:
+                    del self._kept[next(iter(self._kept))]
+                self._kept[blend] = self._source.rows(blend)
+            return self._kept[blend]
 
     @property
     def _phases(self) -> int:
         """The number of states of a node."""
-        return 1 if self._graph[3] is None else 2
+        return 1 if self._turns is None else 2
 
-    def _search(self, start: End, blend: Blend) -> _Search:
-        """Search from a start; only one search runs at a time, because each writes into the shared arrays."""
-        with self._turn_by_turn:
-            return self._dijkstra(start, blend)
+    @cached_property
+    def _speeds(self) -> GreatestSpeeds:
+        return GreatestSpeeds(self.problem, self.position, self.problem.departure)
 
-    def _dijkstra(self, start: End, blend: Blend) -> _Search:
-        (_, target, indptr, turn), cost = self._graph, self._costs(blend)
-        states = len(indptr) - 2
-        first = last = int(indptr[states])
-        origin = int(start.nodes[0]) * self._phases if start.nodes.size else states
-        if start.legs is not None:
-            rows, to = start.legs.outcomes, start.legs.nodes
-            costs, climbs = blend.of(rows[:, COST], rows[:, TIME]), rows[:, GLIDE_ANGLE] > 0
-            last += to.size
-            pump = self.problem.evaluator.cost.inflection(start.point[2])
-            if turn is not None and pump is not None:
-                costs, to = costs + blend.cost * np.where(climbs, pump, 0.0), 2 * to + climbs
-            cost[first:last], target[first:last] = costs, to
-        indptr[-1] = last
-        graph = csr_array((cost[:last], target[:last], indptr), shape=(states + 1, states + 1))
-        distance, before = dijkstra(graph, directed=True, indices=[origin], return_predecessors=True)
-        return _Search(start, blend, origin, distance[0], before[0])
+    def _ahead(self, goal: Array, blend: Blend) -> Ahead:
+        """Return a bound of what remains to a goal (3,) [m]; it says nothing if none is known, or none pays."""
+        if len(self.position) < FAR or not self.problem.evaluator.exact:
+            return NOTHING_AHEAD
+        rates = self.problem.evaluator.cost.kernel()
+        per_second = blend.cost * rates.per_second + blend.time
+        return self._speeds.ahead(goal, CostRates(per_second, blend.cost * rates.per_leg))
+
+    def _search(self, start: End, blend: Blend, goals: Sequence[End] = ()) -> _Search:
+        """Search from a start to one goal; without a goal, or with many, to all that can be reached."""
+        nodes, phases, rows = len(self.position), self._phases, self._rows(blend)
+        states, turns = nodes * phases, self._turns
+        spent, before = np.full(states, math.inf), np.full(states, states, np.int64)
+        origin = states
+        if start.legs is None:
+            origin = int(start.nodes[0]) * phases
+            spent[origin] = 0.0
+        else:
+            legs, climbs = start.legs.outcomes, start.legs.outcomes[:, GLIDE_ANGLE] > 0
+            turn = np.where(climbs, self._turn(blend, start.point[2]), 0.0)
+            to = start.legs.nodes if phases == 1 else 2 * start.legs.nodes + climbs
+            spent[to] = blend.of(legs[:, COST], legs[:, TIME]) + turn
+        last, ahead = np.full(states, math.inf), NOTHING_AHEAD
+        if len(goals) == 1:
+            ahead = self._ahead(goals[0].point, blend)
+            reached, adds, turned = self._last(goals[0], blend)
+            last[reached] = adds + turned
+        turn = np.empty(0) if turns is None else blend.cost * turns
+        least, settled = np.full(nodes, math.nan), np.zeros(states, np.bool_)
+        ends = self.position, turn, ahead, last, least, spent, before, settled
+        while cheapest_ways(Rows(rows.indptr, rows.target, rows.weight, rows.block, rows.known), *ends) >= 0:
+            rows.need(coming(np.where(settled, math.inf, spent + np.repeat(least, phases))) // phases)
+        return _Search(start, blend, rows, origin, spent, before)
 
     def _direct(self, start: End, goals: Sequence[End]) -> list[Edge]:
         """Return the direct legs from start to each goal; between two nodes only the roadmap's edges count."""
@@ -299,50 +299,62 @@ class Planner(RoutePlanner):
             return self._path(start_at, goal_at, [(start_at, goal_at, direct)])
         if not math.isfinite(cost):
             return self.assembly.no_path(start_at, goal_at)
-        hops: list[Hop] = []
+        way = [state]
+        while way[-1] != search.origin:
+            way.append(int(search.before[way[-1]]))
+        hops = self._hops(search, way[::-1])
         if leg is not None:
             hops.append((self._where(search, state), goal_at, leg))
-        while state != search.origin:
-            earlier = int(search.before[state])
-            hops.append(
-                (self._where(search, earlier), self._where(search, state), self._edge(search, earlier, state))
-            )
-            state = earlier
-        return self._path(start_at, goal_at, hops[::-1])
+        return self._path(start_at, goal_at, hops)
+
+    def _last(self, goal: End, blend: Blend) -> tuple[Index, Array, Array]:
+        """Return the states from which a goal is reached, what the last leg of each adds, and what its turn."""
+        phases = self._phases
+        nodes = goal.nodes if goal.legs is None else goal.legs.nodes
+        states = (phases * nodes[:, None] + np.arange(phases)).ravel()
+        none = np.zeros(states.size)
+        if goal.legs is None:
+            return states, none, none
+        rows = np.repeat(goal.legs.outcomes, phases, axis=0)
+        adds = np.asarray(blend.of(rows[:, COST], rows[:, TIME]))
+        if self._turns is None:
+            return states, adds, none
+        turns = (rows[:, GLIDE_ANGLE] > 0) & (states % 2 == 0)
+        return states, adds, blend.cost * np.where(turns, self._turns[states // 2], 0.0)
 
     def _through(self, search: _Search, goal: End) -> tuple[float, int, Edge | None]:
         """Return the least cost of a way to a goal through nodes, its last state, and its last leg if it has one.
 
         The cost is inf if no way exists.
         """
-        phases = self._phases
-        nodes = goal.nodes if goal.legs is None else goal.legs.nodes
-        states = (phases * nodes[:, None] + np.arange(phases)).ravel()
-        costs = search.cost[states]
-        if goal.legs is not None:
-            rows = np.repeat(goal.legs.outcomes, phases, axis=0)
-            costs = costs + search.blend.of(rows[:, COST], rows[:, TIME])
-            if self._turns is not None:
-                turn = (rows[:, GLIDE_ANGLE] > 0) & (states % 2 == 0)
-                costs = costs + search.blend.cost * np.where(turn, self._turns[states // 2], 0.0)
+        states, adds, turned = self._last(goal, search.blend)
+        costs = search.cost[states] + adds + turned
         if not costs.size or not math.isfinite(costs.min()):
             return math.inf, 0, None
         best = int(np.argmin(costs))
-        leg = None if goal.legs is None else edge_of(goal.legs.outcomes[best // phases])
+        leg = None if goal.legs is None else edge_of(goal.legs.outcomes[best // self._phases])
         return float(costs[best]), int(states[best]), leg
 
     def _where(self, search: _Search, state: int) -> Array:
         node = state // self._phases
-        return search.start.point if node == len(self.roadmap.position) else self.roadmap.position[node]
+        return search.start.point if node == len(self.position) else self.position[node]
 
-    def _edge(self, search: _Search, earlier: int, later: int) -> Edge:
-        source, target = earlier // self._phases, later // self._phases
-        if source == len(self.roadmap.position):
+    def _hops(self, search: _Search, way: list[int]) -> list[Hop]:
+        """Return the legs of a way from state to state."""
+        nodes = np.array(way) // self._phases
+        apart, rows = search.start.legs is not None, search.rows
+        within = list(pairwise(nodes[apart:].tolist()))
+        rows.need(np.array([a for a, _ in within], np.int64))
+        begins = [(slice(*rows.indptr[a : a + 2]), b) for a, b in within]
+        edges = [row.start + np.flatnonzero(rows.target[row] == b)[0] for row, b in begins]
+        values = self._source.legs(np.array(edges, np.int64)) if edges else np.empty((0, 6))
+        legs = [edge_of(np.concatenate([[Status.CONNECTED], row])) for row in values]
+        if apart:
             assert search.start.legs is not None
-            return edge_of(search.start.legs.outcomes[np.flatnonzero(search.start.legs.nodes == target)[0]])
-        row = slice(self.roadmap.indptr[source], self.roadmap.indptr[source + 1])
-        n = int(self.roadmap.indptr[source] + np.flatnonzero(self.roadmap.target[row] == target)[0])
-        return Edge(int(Status.CONNECTED), *(float(getattr(self.roadmap, name)[n]) for name in EDGE_FIELDS))
+            first = np.flatnonzero(search.start.legs.nodes == nodes[1])[0]
+            legs.insert(0, edge_of(search.start.legs.outcomes[first]))
+        places = [self._where(search, state) for state in way]
+        return list(zip(places[:-1], places[1:], legs, strict=True))
 
     def _path(self, start: Array, goal: Array, hops: list[Hop]) -> Path:
         return self.assembly.path(start, goal, hops)

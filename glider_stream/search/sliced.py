@@ -17,21 +17,18 @@ from ..kernels.timetable import earliest_arrivals
 from ..roadmap.pairs import Attached, NeighbourLegs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
+from ..roadmap.rows import FASTEST, coming
 from ..roadmap.slices import SlicedRoadmap
 from ..roadmap.store import StoredRoadmap
-from .least_time import fastest_sink
+from .least_time import BESIDE, fastest_sink
 from .path import Hop
 
 AGREES = 0.01
 """A search and a flight agree if their arrivals differ by at most this [s]."""
 MOST_ROUNDS = 100
 """At most this many searches are made for one route."""
-BESIDE = 0.02
-"""A leg may end a little beside its target. This saves at most this share of its time."""
 LAST_LEGS_AT_ONCE = 32
 """If the goal is not a node, the last legs from this many nodes are found together."""
-AHEAD = 512
-"""When a search needs edges that are not read yet, they are read for this many nodes that come next."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,7 @@ class SliceSearch:
         """
         check_unchanged(roadmap, problem)
         assert roadmap.departures is not None
-        self.position, self.departures, self.rows = roadmap.position, roadmap.departures, roadmap.rows
+        self.position, self.departures, self.rows = roadmap.position, roadmap.departures, roadmap.rows(FASTEST)
         self.problem = problem
 
     def fastest(self, start: Array, goal: Array, departure: float) -> tuple[list[Hop] | None, Agreement]:
@@ -183,11 +180,9 @@ class _Query:
         rows, learnt = self.rows, self.learnt.table(arrival.size)
         settled = np.zeros(arrival.size, np.bool_)
         ends = goal, self.least, latest, arrival, before, settled
-        edges = self.departures, rows.indptr, rows.target, rows.time, rows.block
+        edges = self.departures, rows.indptr, rows.target, rows.weight, rows.block
         while earliest_arrivals(*edges, rows.known, *learnt, *ends) >= 0:
-            soonest = np.where(settled, math.inf, arrival + self.least)
-            ahead = min(AHEAD, settled.size) - 1
-            near = np.flatnonzero((soonest <= np.partition(soonest, ahead)[ahead]) & np.isfinite(soonest))
+            near = coming(np.where(settled, math.inf, arrival + self.least))
             slices = self._slice_of(arrival[near])
             last = slices + 1 == self.departures.size  # no row of this node follows
             rows.need(near[last] * self.departures.size + slices[last])
@@ -242,7 +237,7 @@ class _Query:
         rows.need(np.array([row]))
         first, last = rows.indptr[row], rows.indptr[row + 1]
         at = first + int(np.searchsorted(rows.target[first:last], b))
-        return float(rows.time[at]) if at < last and rows.target[at] == b else math.inf
+        return float(rows.weight[at]) if at < last and rows.target[at] == b else math.inf
 
     def _exact(self, start: Array, goal: Array, when: float) -> Array:
         """Return the leg between two points that leaves at a time [s], a row of `Edge`.

@@ -43,7 +43,7 @@ def test_rows_are_read_once_and_as_they_are():
         for row in wanted:
             edges = slice(source.indptr[row], source.indptr[min(row + following, 30)])
             assert rows.target[edges].tobytes() == source.target[edges].tobytes()
-            assert rows.time[edges].tobytes() == source.time[edges].tobytes()
+            assert rows.weight[edges].tobytes() == source.time[edges].tobytes()
     read = np.concatenate([np.arange(*span) for span in source.spans])
     assert np.array_equal(np.sort(read), np.arange(EDGES))
     assert rows.known.all()
@@ -74,5 +74,5 @@ def test_edges_in_memory_are_all_known():
     for target, time in ((np.arange(3, dtype=np.int32), np.arange(3.0)), empty):
         rows = EdgeRows.whole(np.array([0, target.size]), target, time)
         rows.need(np.array([0]))
-        assert rows.time is time
+        assert rows.weight is time
         assert rows.known.all()

@@ -139,7 +139,7 @@ def test_many_goals_from_one_search_and_a_table_are_the_single_queries(router, m
     searches = []
     search = Planner._search
     monkeypatch.setattr(
-        Planner, "_search", lambda self, start, blend: searches.append(start) or search(self, start, blend)
+        Planner, "_search", lambda self, start, *more: searches.append(start) or search(self, start, *more)
     )
     for start, paths in zip(starts, single, strict=True):
         assert [path.as_dict() for path in router.queries(start, goals)] == [path.as_dict() for path in paths]

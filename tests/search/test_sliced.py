@@ -14,9 +14,8 @@ from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
 from glider_stream.kernels.edges import CONNECTED
 from glider_stream.kernels.flow import velocity
-from glider_stream.roadmap import store
+from glider_stream.roadmap import rows, store
 from glider_stream.roadmap.compare import difference
-from glider_stream.search import sliced as sliced_module
 from glider_stream.search.answer import planner_of
 from glider_stream.search.slice_planner import SlicePlanner
 from glider_stream.search.sliced import SliceSearch
@@ -91,20 +90,19 @@ def test_a_leg_from_end_to_end_is_looked_at(search):
 def test_a_roadmap_that_stays_in_its_file_gives_the_same_routes(search, tmp_path, monkeypatch):
     """Bit by bit, though it reads only some edges; a file that was written since, or is damaged, is refused."""
     monkeypatch.setattr(store, "CHUNK", 256)
-    monkeypatch.setattr(sliced_module, "AHEAD", 1)
+    monkeypatch.setattr(rows, "AHEAD", 1)
     file, position = tmp_path / "slices.h5", sliced().position
     store.write_roadmap(sliced(), file)
     beside = np.array([420.0, 380.0, 0.0]), np.array([1510.0, 640.0, -300.0])
     near = position[-2], position[sliced().target[sliced().indptr[(len(position) - 2) * 4]]]
     for ends, departure in ((near, 0.0), ((position[-2], position[-1]), 370.0), (beside, 1300.0)):
         kept = store.stored_roadmap(file)
-        assert str(SliceSearch(kept, problem()).fastest(*ends, departure)) == str(
-            search.fastest(*ends, departure)
-        )
-        assert ends is not near or kept.rows.known.mean() < 0.9
+        by_file = SliceSearch(kept, problem())
+        assert str(by_file.fastest(*ends, departure)) == str(search.fastest(*ends, departure))
+        assert ends is not near or by_file.rows.known.mean() < 0.9
     opened = glider_stream.open(file)
     assert opened.query().as_dict()["legs"] == glider_stream.open(sliced()).query().as_dict()["legs"]
-    assert opened.searches.source.rows.known.any()
+    assert opened.planner().slices.rows.known.any()
     assert difference(opened.roadmap.at(1), sliced().at(1)).same_edges
     kept, late = store.stored_roadmap(file), store.stored_roadmap(file)
     with h5py.File(file, "r+") as damaged:

@@ -2,13 +2,10 @@
 
 import json
 import math
-import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.missions import MISSION
-from helpers.small import SCENARIO
 
 from glider_stream.base.errors import InputError
 from glider_stream.evaluation.baselines import straight
@@ -23,10 +20,7 @@ from glider_stream.kernels.flow import (
     rises,
     velocity,
 )
-from glider_stream.mission.settings import mission_from_table
-from glider_stream.mission.world import Worlds
 from glider_stream.scenario import read_scenario
-from glider_stream.search.flown_on import flown_on
 from glider_stream.search.path import Leg, Path, load_path
 from glider_stream.water.analytic import Abc, InternalWave, Rolls, Uniform, Upwelling
 from glider_stream.water.inspect import is_steady, require_level
@@ -139,17 +133,10 @@ def test_a_scenario_says_that_its_water_rises_and_what_the_line_foresees(problem
     assert "foresee" not in exact.flow_words
 
 
-@pytest.mark.parametrize("what", ["mission", "baseline", "rest of a plan", "2 dimensions"])
-def test_what_takes_no_vertical_current_refuses_it(problem, tmp_path, what):
-    (tmp_path / "small.toml").write_text(SCENARIO)
-    table = tomllib.loads(MISSION)
-    table["scenario"]["set"] += [*CELLS]
-    leg = Leg(problem.start, problem.goal, -0.5, 0.0, 1.0, 0.0, 100.0, 0.0, np.zeros((2, 4)))
-    path = Path(problem.start, problem.goal, 100.0, (leg,))
+@pytest.mark.parametrize("what", ["baseline", "2 dimensions"])
+def test_what_takes_no_vertical_current_refuses_it(problem, what):
     asked = {
-        "mission": lambda: Worlds(mission_from_table(table, tmp_path / "mission.toml")),
         "baseline": lambda: straight(problem, problem.start, problem.goal),
-        "rest of a plan": lambda: flown_on(path, 0.0, problem.start, problem),
         "2 dimensions": lambda: bound(problem, 2),
     }
     with pytest.raises(InputError, match="vertical current, and this flow has one"):

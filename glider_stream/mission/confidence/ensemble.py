@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import Flow, OceanGrid
+from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid
 from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
@@ -108,9 +108,9 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     )
 
 
-def _mean(flows: Sequence[Flow]) -> OceanGrid:
+def _mean(flows: Sequence[Flow]) -> OceanGrid | RisingOceanGrid:
     """Return the mean of currents on one grid; InputError if their points or times differ."""
-    grids = [flow for flow in flows if isinstance(flow, OceanGrid)]
+    grids = [flow for flow in flows if isinstance(flow, OceanGrid | RisingOceanGrid)]
     first, total = grids[0], np.zeros_like(grids[0].values)
     for n, grid in enumerate(grids):
         alike = grid.values.shape == first.values.shape and np.array_equal(grid.times, first.times)
