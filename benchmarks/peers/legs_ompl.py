@@ -1,6 +1,6 @@
 """OMPL's FMT on this project's exact legs: they are its motions, and their time is the cost.
 
-1,000 samples in its box; a motion exists where a leg does. `timedPlannerTerminationCondition` of the 2.0.1 wheel
+300 samples in its box; a motion exists where a leg does. `timedPlannerTerminationCondition` of the 2.0.1 wheel
 waits for ever while Python checks motions, so the planner is one that ends by itself.
 """
 
@@ -66,7 +66,7 @@ def route():
     asked.setStartAndGoalStates(start, goal)
     asked.setOptimizationObjective(objective)
     planner = og.FMT(info)
-    planner.setNumSamples(1000)
+    planner.setNumSamples(300)
     planner.setProblemDefinition(asked)
     planner.setup()
     planner.solve(ob.plannerNonTerminatingCondition())

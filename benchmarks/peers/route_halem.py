@@ -16,7 +16,7 @@ DEPARTURE = "20/11/2024 00:00:00"
 class Roadmap(halem.BaseRoadmap):
     @staticmethod
     def load():
-        data = xr.open_dataset(JOB["file"]).isel(latitude=slice(None, None, 2), longitude=slice(None, None, 2))
+        data = xr.open_dataset(JOB["file"]).isel(latitude=slice(None, None, 2), longitude=slice(1, None, 2))
         lat, lon = np.meshgrid(data["latitude"], data["longitude"], indexing="ij")
         u, v = (np.nan_to_num(data[name].values.reshape(data["time"].size, -1)) for name in ("uo", "vo"))
         hours = 3600.0 * np.arange(max(2, len(u)))
