@@ -199,7 +199,8 @@ def _times(flow: kernel.Flow, settings: ForecastError, departure: float, longest
     steps = [longest]
     if not isinstance(settings.time_s, str):
         steps.append(settings.time_s / PER_LENGTH)
-    period = None if is_steady(flow) else getattr(flow, "period", None)
+    moves = isinstance(flow, kernel.Rolls) and not is_steady(flow)
+    period = kernel.cycle(flow) if moves else None if is_steady(flow) else getattr(flow, "period", None)
     if period is not None:
         steps.append(period / PER_PERIOD)
     count = max(2, math.ceil(longest / min(steps)) + 1)
@@ -234,6 +235,8 @@ def _fitting_axes(true: Problem, settings: ForecastError) -> tuple[Array, Array,
     deep = math.inf if isinstance(settings.depth_m, str) else settings.depth_m / PER_LENGTH
     if isinstance(evaluator.flow, kernel.Vortices):
         deep = min(deep, float(evaluator.flow.thickness.min()) / PER_LENGTH)
+    if kernel.rises(evaluator.flow):
+        deep = min(deep, known.length_scale / PER_LENGTH)
     return x, y, _axis(float(true.lo[2]), 0.0, deep)
 
 
