@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path as File
+from typing import TypeGuard
 
 from ..base.errors import InputWarning
 from ..base.settings import require
@@ -79,7 +80,7 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
     return OpenedScenario(Searches(read_scenario(scenario, overrides)), File(scenario).stem)
 
 
-def is_plan(source: object) -> bool:
+def is_plan(source: object) -> TypeGuard[str | File]:
     """Return whether a source is the name of a path file (.json)."""
     return isinstance(source, str | File) and File(source).suffix.lower() == ".json"
 
