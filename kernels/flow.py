@@ -19,7 +19,7 @@ JUST_BELOW = 1.0 - 2.0**-52
 """A factor just below 1: it puts the last point of a grid into the cell before that point."""
 
 ROUNDING = 1e-9
-"""A quick look at a whole box is this much stricter, in grid indices, than looks at its places, which are rounded."""
+"""A quick look at a box is this much stricter, in grid indices, than a look at a place, which is rounded."""
 
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
@@ -339,8 +339,8 @@ def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
 def index_ranges(index_map, x_lo, x_hi, y_lo, y_hi, from_x, from_y, per_x, per_y):
     """Return the least and greatest fractional indices in a box [m]: i_lo, i_hi, j_lo, j_hi; see `grid_index`.
 
-    Between the map's points the indices are bilinear, so they are greatest and least at corners of the pieces into
-    which these points cut the box.
+    Between the map's points the indices are bilinear, so they are greatest and least at corners of the pieces
+    into which these points cut the box.
     """
     p_last, q_last = index_map.shape[0] - 1.0, index_map.shape[1] - 1.0
     p_lo, p_hi = min(max((x_lo - from_x) * per_x, 0.0), p_last), min(max((x_hi - from_x) * per_x, 0.0), p_last)
@@ -363,9 +363,12 @@ def index_ranges(index_map, x_lo, x_hi, y_lo, y_hi, from_x, from_y, per_x, per_y
     return i_lo, i_hi, j_lo, j_hi
 
 
-def _ocean_grid(flow, x, y, z, t):
+def _index_on_map(flow, x, y):
+    return grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
+
+
+def _at_index(flow, at_i, at_j, z, t):
     values = flow.values
-    at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
     i, a = _cell(at_i, values.shape[2])
     j, b = _cell(at_j, values.shape[3])
     k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
@@ -373,13 +376,17 @@ def _ocean_grid(flow, x, y, z, t):
     return pair_between(values, (n, k, i, j), (d, c, a, b))
 
 
-def _one_time_of_ocean_grid(flow, x, y, z):
+def _at_index_once(flow, at_i, at_j, z):
     values = flow.values
-    at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
     i, a = _cell(at_i, values.shape[2])
     j, b = _cell(at_j, values.shape[3])
     k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
     return pair_between(values, (np.uintp(0), k, i, j), (c, a, b))
+
+
+def _ocean_grid(flow, x, y, z, t):
+    at_i, at_j = index_on_map(flow, x, y)
+    return at_index(flow, at_i, at_j, z, t)
 
 
 def _upwelling(flow, x, y, z, t):
@@ -461,7 +468,7 @@ def _box_in_ocean_grid(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
         flow.index_map, x_lo, x_hi, y_lo, y_hi, known.x_lo, known.y_lo, flow.per_x, flow.per_y
     )
     i_last, j_last = flow.values.shape[2] - 1 - ROUNDING, flow.values.shape[3] - 1 - ROUNDING
-    return ROUNDING <= i_lo and i_hi <= i_last and ROUNDING <= j_lo and j_hi <= j_last
+    return min(i_lo, j_lo) >= ROUNDING and i_hi <= i_last and j_hi <= j_last
 
 
 def _steady_carry(flow, z):
@@ -489,11 +496,23 @@ def _is_of_one_time(flow):
     return flow.extent.t_lo == -math.inf
 
 
-def _at_no_time(flow, x, y, z):
-    return velocity(flow, x, y, z, 0.0)
+def _cell_size(flow):
+    return flow.extent.length_scale
 
 
-def _no_rise(flow):
+def _no_index(flow, x, y):
+    return math.nan, math.nan
+
+
+def _not_at_index(flow, at_i, at_j, z, t):
+    return math.nan, math.nan
+
+
+def _not_at_index_once(flow, at_i, at_j, z):
+    return math.nan, math.nan
+
+
+def _none(flow):
     return 0.0
 
 
@@ -536,9 +555,13 @@ class Abilities(NamedTuple):
     cycle: Callable[..., float] = _no_cycle
     current: Callable[..., Any] = _level_current
     rises: Callable[..., Any] = _no
-    max_rise: Callable[..., Any] = _no_rise
+    max_rise: Callable[..., Any] = _none
+    cell_size: Callable[..., Any] = _none
+    is_mapped: Callable[..., Any] = _no
     has_one_time: Callable[..., Any] = _no
-    at_one_time: Callable[..., Any] = _at_no_time
+    index_on_map: Callable[..., Any] = _no_index
+    at_index: Callable[..., Any] = _not_at_index
+    at_index_once: Callable[..., Any] = _not_at_index_once
 
 
 def _rising(current: Callable[..., Any], **others: Callable[..., Any]) -> Abilities:
@@ -559,8 +582,12 @@ ABILITIES: dict[type, Abilities] = {
         contains=_in_ocean_grid,
         contains_box=_box_in_ocean_grid,
         cycle=_ocean_cycle,
+        cell_size=_cell_size,
+        is_mapped=_yes,
         has_one_time=_is_of_one_time,
-        at_one_time=_one_time_of_ocean_grid,
+        index_on_map=_index_on_map,
+        at_index=_at_index,
+        at_index_once=_at_index_once,
     ),
     Upwelling: _rising(_upwelling),
     Rolls: _rising(_rolls, cycle=_rolls_cycle),
@@ -592,14 +619,34 @@ def max_rise(flow: Flow) -> float:
     return ABILITIES[type(flow)].max_rise(flow)
 
 
+def cell_size(flow: Flow) -> float:
+    """Return the size [m] of the cells of a file's grid, within which its current is smooth; else 0."""
+    return ABILITIES[type(flow)].cell_size(flow)
+
+
+def is_mapped(flow: Flow) -> bool:
+    """Return whether `velocity` is `index_on_map`, then `at_index`; kernels know it when they are compiled."""
+    return ABILITIES[type(flow)].is_mapped(flow)
+
+
 def has_one_time(flow: Flow) -> bool:
-    """Return whether the flow comes from a file of one time, so that `at_one_time` reads it faster."""
+    """Return whether a mapped flow comes from a file of one time, so that `at_index_once` reads it faster."""
     return ABILITIES[type(flow)].has_one_time(flow)
 
 
-def at_one_time(flow: Flow, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return `velocity` of a flow that `has_one_time`: the same bits, without its times."""
-    return ABILITIES[type(flow)].at_one_time(flow, x, y, z)
+def index_on_map(flow: Flow, x: float, y: float) -> tuple[float, float]:
+    """Return the fractional indices of a place [m] on a mapped flow's grid."""
+    return ABILITIES[type(flow)].index_on_map(flow, x, y)
+
+
+def at_index(flow: Flow, at_i: float, at_j: float, z: float, t: float) -> tuple[float, float]:
+    """Return the current (u, v) [m/s] of a mapped flow at fractional indices, a height [m] and a time [s]."""
+    return ABILITIES[type(flow)].at_index(flow, at_i, at_j, z, t)
+
+
+def at_index_once(flow: Flow, at_i: float, at_j: float, z: float) -> tuple[float, float]:
+    """Return `at_index` of a flow that `has_one_time`: the same bits, without a look at its times."""
+    return ABILITIES[type(flow)].at_index_once(flow, at_i, at_j, z)
 
 
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
@@ -623,7 +670,9 @@ def carry(flow: Flow, z: float) -> float:
     return ABILITIES[type(flow)].carry(flow, z)
 
 
-for _ability in (velocity, current, rises, max_rise, contains, contains_box, carry, has_one_time, at_one_time):
+_PUBLIC = (velocity, current, rises, max_rise, contains, contains_box, carry)
+_ON_MAPS = (cell_size, is_mapped, has_one_time, index_on_map, at_index, at_index_once)
+for _ability in (*_PUBLIC, *_ON_MAPS):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
 
 

@@ -33,8 +33,8 @@ def _between(values, cell, weight):
 def pair_between(values: Any, cell: Any, weight: Any) -> tuple[float, float]:
     """The pair at a fractional index: values (n_1, ..., n_d, 2), cell (d,) unsigned, weight (d,) of cell + 1.
 
-    With fewer weights the first axes are read at their cell. Nothing is checked: each cell must be below n - 1, and
-    below n along an axis without a weight.
+    With fewer weights the first axes are read at their cell. Nothing is checked: each cell must be below n - 1,
+    and below n along an axis without a weight.
     """
     u, v = _between(values, cell, weight)
     return u, v

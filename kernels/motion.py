@@ -6,7 +6,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .cache import entry_point, in_kernels, inlined, kernel, making
-from .flow import Flow, at_one_time, by_rise, carry, contains, current, has_one_time, rises, velocity
+from .flow import (
+    Flow,
+    at_index,
+    at_index_once,
+    by_rise,
+    carry,
+    contains,
+    current,
+    has_one_time,
+    index_on_map,
+    is_mapped,
+    rises,
+    velocity,
+)
 from .place import Place
 from .terrain import allowed, open_in_box
 
@@ -260,18 +273,42 @@ LANE_ROWS = 20
 """The rows above and the stages' own; a caller's lanes may have more."""
 
 
+@inlined
+def _mapped_slopes(flow, flat, x, y, share, u, v):
+    """As `_slopes`: all indices first, into rows u, v, then all currents; small loops keep more in registers.
+
+    A question for each lane whether the flow has one time would cost more than it saves.
+    """
+    for n in range(LANES):
+        flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = index_on_map(
+            flow, flat[np.uintp(x * LANES + n)], flat[np.uintp(y * LANES + n)]
+        )
+    if has_one_time(flow):
+        for n in range(LANES):
+            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+            flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_index_once(
+                flow,
+                flat[np.uintp(u * LANES + n)],
+                flat[np.uintp(v * LANES + n)],
+                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
+            )
+    else:
+        for n in range(LANES):
+            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+            flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_index(
+                flow,
+                flat[np.uintp(u * LANES + n)],
+                flat[np.uintp(v * LANES + n)],
+                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
+                flat[np.uintp(LANE_T * LANES + n)] + along,
+            )
+
+
 @kernel
 def _slopes(flow, flat, x, y, share, u, v):
     """Currents of all lanes at rows x, y into rows u, v, at `share` of the step in depth and time."""
-    if has_one_time(flow):  # a branch inside the loop costs more than it saves
-        for n in range(LANES):
-            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
-            flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_one_time(
-                flow,
-                flat[np.uintp(x * LANES + n)],
-                flat[np.uintp(y * LANES + n)],
-                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
-            )
+    if is_mapped(flow):
+        _mapped_slopes(flow, flat, x, y, share, u, v)
         return
     for n in range(LANES):
         along = share * flat[np.uintp(LANE_STEP * LANES + n)]

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid
+from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid, max_rise
 from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
@@ -17,7 +17,7 @@ from ...water.ocean import OceanFlow
 from ...water.ocean.ensemble import member_labels
 from ..orders import is_up
 from ..settings import Mission
-from ..world import Worlds
+from ..world import Worlds, check_ends, check_known
 
 MOST_MEMBERS = 10_000
 KEPT = 64
@@ -91,12 +91,11 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     """
     scenarios = _scenarios(mission.scenario, files)
     problems = [_timed(scenario.problem()) for scenario in scenarios]
+    for problem in problems:
+        check_known(problem, mission, "members' current")
+    check_ends(problems[0])
     mean = _mean([problem.evaluator.flow for problem in problems])
     forecast = replace(problems[0], evaluator=replace(problems[0].evaluator, flow=mean))
-    until = forecast.departure + mission.arrival.longest
-    known = forecast.evaluator.flow.extent
-    why = f"`arrival.longest_hours` = {mission.arrival.longest_hours:g} reaches beyond the times of the members"
-    require(until <= known.t_hi, f"{why}, which end {(known.t_hi - forecast.departure) / 3600:.3g} h later")
     names = ", ".join(Path(file).name for file in files[:3]) + (", ..." if len(files) > 3 else "")
     numbers = tuple(range(len(problems)))
     return Ensemble(
@@ -119,7 +118,11 @@ def _mean(flows: Sequence[Flow]) -> OceanGrid | RisingOceanGrid:
         require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
         total += grid.values
     fastest = max(grid.extent.max_speed for grid in grids)
-    return first._replace(values=total / len(grids), extent=first.extent._replace(max_speed=fastest))
+    values, extent = total / len(grids), first.extent._replace(max_speed=fastest)
+    if isinstance(first, RisingOceanGrid):
+        # a bound as that of the speed: the mean may rise faster than the first member
+        return first._replace(values=values, extent=extent, max_rise=max(max_rise(grid) for grid in grids))
+    return first._replace(values=values, extent=extent)
 
 
 def first_member(files: Sequence[str | Path]) -> list[str]:
