@@ -275,8 +275,17 @@ def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
     doubled.isel(depth=[0, 1, 3, 4]).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
     files = [tmp_path / "a.nc", tmp_path / "less.nc"]
     read = read_mission("ionian", first_member(files))
-    with pytest.raises(InputError, match="have different points or times, so they have no mean"):
+    with pytest.raises(InputError, match=r"a\.nc and less\.nc have different points: .*; cut them alike"):
         from_files(read, files)
+    doubled.assign_coords(time=doubled.time + np.timedelta64(5, "D")).to_netcdf(
+        tmp_path / "later.nc", engine="h5netcdf"
+    )
+    with pytest.raises(InputError, match=r"a\.nc and later\.nc have different times: .*; cut them alike"):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "later.nc"])
+    with pytest.raises(
+        InputError, match=r"members a\.nc and a\.nc hold the same currents; leave one of them out"
+    ):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "a.nc"])
 
 
 def test_the_mean_of_rising_members_knows_how_fast_it_may_rise():
