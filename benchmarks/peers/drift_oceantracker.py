@@ -1,5 +1,7 @@
 """Drift by OceanTracker: its reader of Copernicus files, Runge-Kutta 4, no dispersion."""
 
+import contextlib
+import io
 import tempfile
 from pathlib import Path
 
@@ -26,7 +28,10 @@ def drift():
         "release_groups", name="all", class_name="PointRelease", pulse_size=1,
         points=list(zip(lon, lat, -depth, strict=True)),
     )  # fmt: skip
-    case = tracker.run()
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        case = tracker.run()
+    if case is None:  # it prints why
+        raise RuntimeError(next(line for line in said.getvalue().splitlines() if "Could not" in line))
     tracks = xr.open_dataset(case["output_files"]["tracks_writer"][0])
     return tracks["x"].values[-1].T[:2]
 

@@ -1,4 +1,7 @@
-"""Drift by Parcels 3: its AdvectionRK4 as compiled C (JITParticle)."""
+"""Drift by Parcels 3: its AdvectionRK4 as compiled C (JITParticle).
+
+Version 3 adds a step's displacement when the next step begins, so one step more is asked for.
+"""
 
 from datetime import timedelta
 
@@ -14,7 +17,7 @@ def drift():
     particles = ParticleSet(fieldset, pclass=JITParticle, lon=lon, lat=lat, depth=depth)
     particles.execute(
         AdvectionRK4,
-        runtime=timedelta(seconds=JOB["lasting_s"]),
+        runtime=timedelta(seconds=JOB["lasting_s"] + JOB["step_s"]),
         dt=timedelta(seconds=JOB["step_s"]),
         verbose_progress=False,
     )

@@ -5,12 +5,12 @@ from harness import JOB, answer, finite, timed
 from glider_stream.evaluation.vector_field_rrt import vf_rrt
 from glider_stream.scenario import read_scenario
 
-STEERING = "flow-map"
+STEERING = ["steering.method=flow-map"]
 seeds, found = iter(range(JOB["runs"] + 1)), []
 
 
 def route():
-    problem = read_scenario(JOB["scenario"], [f"steering.method={STEERING}"]).problem()
+    problem = read_scenario(JOB["scenario"], STEERING).problem()
     found.append(vf_rrt(problem, 150.0, seed=next(seeds)).travel_time)
 
 

@@ -180,9 +180,11 @@ def legs(name: str) -> Made:
         def measure(found: dict[str, Any]) -> dict[str, Any]:
             times = [np.inf if one is None else one for one in found["routes_s"]]
             middle = {"median": float(np.median(times)), "low": min(times), "high": max(times)}
+            known = {key: value if np.isfinite(value) else None for key, value in middle.items()}
             assert reference.seconds is not None
+            over = None if known["median"] is None else known["median"] / reference.seconds
             found_of = f"{sum(np.isfinite(times))} of {len(times)}"
-            return {"routes_s": middle, "found": found_of, "over_level_set": middle["median"] / reference.seconds}
+            return {"routes_s": known, "found": found_of, "over_level_set": over}
 
         return measure
 

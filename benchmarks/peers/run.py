@@ -68,7 +68,7 @@ PEERS = (
         "trajectories of oil, plankton, ships, people", "many models and readers, stranding, waves; no planning",
     ),
     Peer(
-        "OceanTracker", ("oceantracker==0.5.3.9",), "drift_oceantracker.py", "drift",
+        "OceanTracker", ("oceantracker==0.5.3.9", "exceptiongroup", *READS), "drift_oceantracker.py", "drift",
         "Lagrangian tracking, compiled by Numba", "unstructured grids, statistics on the fly; no planning",
     ),
     *(
@@ -147,10 +147,15 @@ def last_line(text: str) -> str:
     return next((line.strip() for line in reversed(text.splitlines()) if line.strip()), "no message")
 
 
+def answer_of(peer: Peer, folder: Path) -> Path:
+    """The file of a peer's answer to its problem."""
+    return folder / "answers" / f"{peer.problem}-{peer.script.removesuffix('.py')}.answer"
+
+
 def ask(peer: Peer, folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """A peer's answer to a job: run now on one thread, or what it answered before."""
-    file = folder / "answers" / f"{peer.problem}-{peer.script.removesuffix('.py')}.json"
-    answer = file.with_suffix(".answer")
+    answer = answer_of(peer, folder)
+    file = answer.with_suffix(".json")
     file.parent.mkdir(exist_ok=True)
     file.write_text(json.dumps(job))
     if answer.exists():
@@ -200,6 +205,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, required=True, help="environments, problems and answers")
     parser.add_argument("--only", action="append", help="a peer or a problem; again for more")
     parser.add_argument("--again", action="append", default=[], help="forget a peer's answers; again for more")
+    parser.add_argument("--answered", action="store_true", help="only peers that have answered before")
     parser.add_argument("--beside", action="store_true", help="other work runs on the machine: say so")
     parser.add_argument("-o", "--output", type=Path, help="the record")
     parser.add_argument("--table", type=Path, help="a document: its tables are written anew")
@@ -209,14 +215,15 @@ def main() -> None:
         parser.error(f"`--folder` must not be in the project; got {folder}")
     folder.mkdir(parents=True, exist_ok=True)
     asked = [peer for peer in PEERS if not args.only or {peer.name, peer.problem} & set(args.only)]
+    if args.answered:
+        asked = [peer for peer in asked if answer_of(peer, folder).exists()]
     rows = []
     for problem in dict.fromkeys(peer.problem for peer in asked):
         job, judge = problems.make(problem, args.currents.absolute(), folder)
         answers: dict[str, dict[str, Any]] = {}
         for peer in (one for one in asked if one.problem == problem):
             if peer.name in args.again:
-                stem = f"{peer.problem}-{peer.script.removesuffix('.py')}"
-                (folder / "answers" / f"{stem}.answer").unlink(missing_ok=True)
+                answer_of(peer, folder).unlink(missing_ok=True)
             answers[peer.script] = ask(peer, folder, job)
             print(peer.problem, peer.name, answers[peer.script].get("failed", "answered"), flush=True)
         measure = judge(answers)

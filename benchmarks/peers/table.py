@@ -13,6 +13,10 @@ def _seconds(spread: dict[str, float], digits: int = 3) -> str:
     return f"{spread['median']:.{digits}g} s ({low} to {high})"
 
 
+def _or_none(value: float | None, shape: str) -> str:
+    return "none" if value is None else format(value, shape)
+
+
 def _drift(row: Row) -> list[str]:
     rate = {key: value / 1e6 for key, value in row["evaluations_per_s"].items()}
     ends = row.get("metres_from_ours", {"median": math.nan, "most": math.nan})
@@ -31,11 +35,11 @@ def _surface(row: Row) -> list[str]:
 
 
 def _legs(row: Row) -> list[str]:
-    routes = row["routes_s"]
+    middle, low, high = (_or_none(row["routes_s"][key], ",.0f") for key in ("median", "low", "high"))
     return [
         row["found"],
-        f"{routes['median']:,.0f} s ({routes['low']:,.0f} to {routes['high']:,.0f})",
-        f"{row['over_level_set']:.3f}",
+        f"{middle} s ({low} to {high})",
+        _or_none(row["over_level_set"], ".3f"),
         _seconds(row["processor_s"]),
     ]
 

@@ -12,6 +12,10 @@ from glider_stream.evaluation.fmt_star import ETA, fmt_radius, fmt_star, marched
 from glider_stream.scenario import read_scenario
 
 COUNT, RADIUS = 120, 0.3
+MIDDLE, DISK, ENDS = np.array([0.5, 0.5]), 0.25, np.array([[0.1, 0.1], [0.9, 0.9]])
+OUT = 0.4 * math.sqrt(2.0)
+AROUND = 2.0 * math.sqrt(OUT**2 - DISK**2) + DISK * (math.pi - 2.0 * math.acos(DISK / OUT))
+"""The shortest way around the disk: two tangents and an arc."""
 
 
 def plane(seed):
@@ -59,6 +63,66 @@ def test_a_goal_beyond_a_gap_is_not_reached():
     near = [np.array([1]), np.array([0]), np.array([], int)]
     arrival, _, _ = marched(near, lambda sources, leaves, rows: np.ones(sum(map(len, rows))), 0, 2)
     assert arrival[2] == math.inf
+
+
+def clear(a, b):
+    """Whether the segments from a (2,) to b (n, 2) leave out a disk in the middle of the unit square."""
+    along = b - a
+    share = np.clip(((MIDDLE - a) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return np.hypot(*(a + share[:, None] * along - MIDDLE).T) > DISK
+
+
+def around_the_disk(seed):
+    """The length of the way by FMT* from corner to corner, around the disk."""
+    drawn = np.random.default_rng(seed).random((440, 2))
+    free = drawn[np.hypot(*(drawn - MIDDLE).T) > DISK][:300]
+    places = np.vstack([free, ENDS])
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    radius = fmt_radius(300, 1.0 - math.pi * DISK**2, 2)
+    near = [np.flatnonzero((row <= radius) & (row > 0)) for row in apart]
+
+    def steer(sources, leaves, rows):
+        pairs = zip(sources, rows, strict=True)
+        legs = [np.where(clear(places[a], places[row]), apart[a, row], math.inf) for a, row in pairs]
+        return np.concatenate([[], *legs])
+
+    return marched(near, steer, 300, 301)[0][-1]
+
+
+def test_ways_around_a_disk_are_little_longer_than_the_shortest():
+    lengths = np.array([around_the_disk(seed) for seed in range(3)])
+    assert (lengths >= AROUND).all()
+    assert np.median(lengths) < 1.12 * AROUND
+
+
+def test_ways_around_a_disk_are_as_long_as_those_of_ompl():
+    base = pytest.importorskip("ompl.base", reason="OMPL is not installed")
+    from ompl.geometric import FMT
+
+    theirs = []
+    for _ in range(5):
+        space, bounds = base.RealVectorStateSpace(2), base.RealVectorBounds(2)
+        for n in range(2):
+            bounds.setLow(n, 0.0)
+            bounds.setHigh(n, 1.0)
+        space.setBounds(bounds)
+        info = base.SpaceInformation(space)
+        info.setStateValidityChecker(lambda at: math.hypot(at[0] - 0.5, at[1] - 0.5) > DISK)
+        info.setup()
+        ends = space.allocState(), space.allocState()
+        for state, end in zip(ends, ENDS, strict=True):
+            state[0], state[1] = end.tolist()
+        asked = base.ProblemDefinition(info)
+        asked.setStartAndGoalStates(*ends)
+        planner = FMT(info)
+        planner.setNumSamples(300)
+        planner.setNearestK(False)
+        planner.setProblemDefinition(asked)
+        planner.setup()
+        planner.solve(base.plannerNonTerminatingCondition())
+        theirs.append(asked.getSolutionPath().length())
+    ours = [around_the_disk(seed) for seed in range(5)]
+    assert np.median(ours) == pytest.approx(np.median(theirs), rel=0.03)
 
 
 def test_the_radius_is_that_of_theorem_4_1():
