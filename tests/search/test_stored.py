@@ -9,7 +9,7 @@ import glider_stream
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.plot import roadmap as drawing
-from glider_stream.roadmap import rows, store
+from glider_stream.roadmap import store
 from glider_stream.roadmap.roadmap import EDGE_FIELDS
 from glider_stream.scenario import scenario_of
 from glider_stream.search import query
@@ -35,7 +35,12 @@ def file(request, tmp_path_factory):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Blocks of 16 edges; every roadmap stays in its file, and its searches are directed by a bound."""
-    for module, name, value in ((store, "CHUNK", 16), (store, "LARGE", 0), (rows, "AHEAD", 1), (query, "FAR", 0)):
+    for module, name, value in (
+        (store, "CHUNK", 16),
+        (store, "LARGE", 0),
+        (query, "TOGETHER", 1),
+        (query, "FAR", 0),
+    ):
         monkeypatch.setattr(module, name, value)
 
 
