@@ -10,8 +10,8 @@ project's legs, edges or steering: only the flow as the planner reads it, the po
   - SOFT, which moves alike and has no tip. V(goal, t) tells the tau for which a glider begun somewhere within
   tau of the start first reaches the goal at t. A glider from the start itself needs tau / (1 + m / Vh) or more
   to get out of there, m the greatest current within tau, Vh the greatest horizontal speed, and t from then on:
-  t + tau / (1 + m / Vh) is a bound below. One run gives every tau; large ones bound loosely, and within four
-  cells or so the front is smeared and late.
+  t + tau / (1 + m / Vh) is a bound below. One run gives every tau; large ones bound loosely where the current
+  near the start is strong, and within four cells or so the front is smeared and late. --tau says which counts.
 - Either end. In a steady flow the front may as well begin at the goal, in the opposite flow. The runs that
   count begin at the end with the smaller m; all grids but the finest are run from the other end too, as a check.
 - A flow that changes with time is read anew at the middle of every STEP; the front then begins at the start
@@ -67,8 +67,7 @@ from glider_stream.water.inspect import is_steady
 
 GRIDS = ("51,51,31", "101,101,61", "201,201,61")
 TAUS = (40, 60, 80, 100)
-"""Sizes [s] of the set that the front begins at; the bound is read at TAU."""
-TAU = 60
+"""Sizes [s] of the set that the front begins at."""
 SOFT = 60.0
 STEP = 4.0
 """Between readings [s]; the solver's own steps are shorter."""
@@ -287,7 +286,7 @@ def shorten(waters: Waters, path: np.ndarray, duration: float) -> dict[str, floa
 def run(args: argparse.Namespace) -> dict[str, Any]:
     """Every grid, coarse to fine; the path from above; what they say together."""
     waters = Waters(read_scenario(args.scenario, args.set).problem())
-    slower = [waters.quickening(end, TAU) for end in waters.ends]
+    slower = [waters.quickening(end, args.tau) for end in waters.ends]
     backwards = waters.steady and slower[1] < slower[0]
     shapes = [tuple(int(n) for n in text.split(",")) for text in args.grid or GRIDS]
     runs: list[dict[str, Any]] = []
@@ -304,12 +303,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 "wall_s": round(front.wall, 1),
             })  # fmt: skip
             print(runs[-1], file=sys.stderr, flush=True)
-            if front.frames and math.isfinite(front.touch[TAU]):
-                above = shorten(waters, front.trace(waters), front.touch[TAU] + TAU)
+            if front.frames and math.isfinite(front.touch[args.tau]):
+                above = shorten(waters, front.trace(waters), front.touch[args.tau] + args.tau)
                 print(f"a path that arrives: {above}", file=sys.stderr, flush=True)
     packages = ", ".join(f"{n} {importlib.metadata.version(n)}" for n in ("hj-reachability", "jax", "numpy"))
     processor = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, {packages}"
-    found = {**conclude(runs, above), "path_that_arrives": above, "runs": runs}
+    found = {**conclude(runs, above, str(args.tau)), "path_that_arrives": above, "runs": runs}
     return {
         "command": " ".join(["python", "benchmarks/level_set.py", *sys.argv[1:]]),
         "machine": processor,
@@ -317,17 +316,17 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def conclude(runs: list[dict[str, Any]], above: dict[str, float]) -> dict[str, Any]:
+def conclude(runs: list[dict[str, Any]], above: dict[str, float], tau: str) -> dict[str, Any]:
     """The finest grid's bound [s], the estimate of its error, and the one less the other."""
-    finest, at = runs[-1], [one["bound_s"][str(TAU)] for one in runs]
+    finest, at = runs[-1], [one["bound_s"][tau] for one in runs]
     coarser = [one for one in runs if one["grid"] != finest["grid"]]
     if not coarser:
         return {"finest_s": at[-1], "error_s": None, "bound_s": None}
     next_grid = [one for one in coarser if one["grid"] == coarser[-1]["grid"]]
     same_way = next(one for one in next_grid if one["from"] == finest["from"])
     differences = {
-        "next_grid": abs(at[-1] - same_way["bound_s"][str(TAU)]),
-        "ends": float(np.ptp([one["touch_plus_tau_s"][str(TAU)] for one in next_grid])),
+        "next_grid": abs(at[-1] - same_way["bound_s"][tau]),
+        "ends": float(np.ptp([one["touch_plus_tau_s"][tau] for one in next_grid])),
         "tau": float(np.ptp(list(runs[-1]["touch_plus_tau_s"].values()))),
         "above_the_path": max(0.0, at[-1] - above.get("travel_time_s", math.inf)),
     }
@@ -346,6 +345,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", help="a scenario with a [query]")
     parser.add_argument("--grid", action="append", metavar="NX,NY,NZ", help="again for more, coarse to fine")
+    parser.add_argument("--tau", type=int, choices=TAUS, default=60, help="the bound is read at this size [s]")
     parser.add_argument("--latest", type=float, default=7200.0, help="give up at this time [s]")
     parser.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE")
     parser.add_argument("-o", "--output", type=Path, help="a JSON file to keep the result in")

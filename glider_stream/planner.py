@@ -14,7 +14,7 @@ from .base.output import check_apart, check_output, replacing
 from .base.settings import require
 from .jobs.build import Job, build_file, shard_of
 from .jobs.build import merge as merge_parts
-from .opened import OpenedRoadmap, open_either, open_plan, open_scenario, split_outputs
+from .opened import OpenedRoadmap, is_plan, open_either, open_plan, open_scenario, split_outputs
 from .opened import open as open_roadmap
 from .pilot.card import Card
 from .pilot.lint import Linted
@@ -513,6 +513,8 @@ def plot(
 ) -> "Figure | None":
     """Draw a path over its roadmap or scenario, or a roadmap; see `OpenedRoadmap.plot`.
 
+    In place of `roadmap` a path file may stand: it is drawn over what it was made with.
+
     Examples:
         >>> path = planner.query("small.h5")
         >>> figure = planner.plot("small.h5", path, "chart.png", chart=True)
@@ -520,12 +522,13 @@ def plot(
     """
     from .plot.draw import check_drawing
 
-    check_drawing(output, path, depths, chart, fronts)  # before the roadmap is read
-    return open_either(roadmap, overrides).plot(path, output, depths, chart=chart, fronts=fronts)
+    route = roadmap if path is None and is_plan(roadmap) else path
+    check_drawing(output, route, depths, chart, fronts)  # before the roadmap is read
+    return open_either(roadmap, overrides).plot(route, output, depths, chart=chart, fronts=fronts)
 
 
 def plot_routes(
-    roadmap: AnyRoadmap,
+    roadmap: AnyRoadmap | Scenario,
     paths: Sequence[str | File] | Mapping[str, Path],
     output: str | File | None = None,
     depth: float | None = None,
@@ -534,11 +537,13 @@ def plot_routes(
 ) -> "Figure":
     """Draw two to four paths of one problem side by side; see `OpenedRoadmap.plot_routes`.
 
+    In place of `roadmap` a scenario may stand, or a path file: what that was made with.
+
     Examples:
         >>> paths = {"near": planner.query("small.h5", goal=(0, 0, -150)), "far": planner.query("small.h5")}
         >>> figure = planner.plot_routes("small.h5", paths, "routes.png")
     """
-    return open_roadmap(roadmap, overrides).plot_routes(paths, output, depth)
+    return open_either(roadmap, overrides).plot_routes(paths, output, depth)
 
 
 def plot_steering(
@@ -710,7 +715,7 @@ def _measurements(
     columns: Mapping[str, str] | None,
 ) -> "list[Measurements]":
     """Return the measurements in some files."""
-    from .water.mapping.dive_files import read_dives, read_drifters, read_points
+    from .water.mapping.observation_files import read_dives, read_drifters, read_points
 
     kinds = sum(map(bool, (dives, points, drifters)))
     require(kinds > 0, "there are no measurements; give files of dives, points or drifters")

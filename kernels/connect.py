@@ -35,6 +35,7 @@ from .flight import (
     place,
     rest,
     stayed_inside,
+    stayed_open,
     widen,
 )
 from .flow import Array, Numbers, carry, max_rise
@@ -263,7 +264,10 @@ def _settle(medium, lanes, n, edge, chosen):
         return chosen
     c = _control_in(lanes, n)
     start, _ = ends_of(lanes, n)
-    if is_clear(medium.flow, medium.terrain, start, c, duration, integration.dt, CLEARANCE_SPACING):
+    flow, terrain, z_end = medium.flow, medium.terrain, start.z + c.w * duration
+    if stayed_open(flow, terrain, lanes, n, start.z, z_end) or is_clear(
+        flow, terrain, start, c, duration, integration.dt, CLEARANCE_SPACING
+    ):
         store(edge, Edge(CONNECTED, duration, cost, c.glide_angle, c.heading, c.speed, lanes[TRY_MISS, n]))
         return lanes[TRY_CONTROL, n]
     if edge[STATUS] == NO_HIT:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .cache import entry_point, inlined, kernel, making
 from .control import angle_of_vertical_speed, control_towards, vertical_speed
 from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_to, hangar, place, rest
-from .flow import Array, Numbers, max_rise
+from .flow import Array, Numbers, max_rise, rises
 from .motion import LANE_T, LANE_W, LANE_X, LANE_Y, LANE_Z, LANES
 from .patch import (
     LANDING_COLUMNS,
@@ -24,8 +24,10 @@ from .patch import (
     Nodes,
     Slab,
     any_wanted_around,
+    complete_corners,
     fill_patch,
     guess_in_patch,
+    hold_corners,
     landed_corners,
     longer,
     wants_halving,
@@ -41,6 +43,9 @@ CORNERS = 9
 FAN_VERTEX, FAN_LEVEL = FLIGHT_ROWS, FLIGHT_ROWS + 1
 """Rows of a lane beyond `flight`'s: its vertex, and the level that it flies to."""
 FAN_ROWS = FLIGHT_ROWS + 2
+BACK_AGAIN = 0.01
+"""In a flow that rises a fan of nodes at any depth has a level this far [m] beyond its origin: a control that is
+carried the other way at first comes back there, far from the origin."""
 IN_TIME = 1.0 + 1e-9
 """A level counts as reached in time up to this multiple of the horizon."""
 
@@ -143,14 +148,25 @@ def layers_outward(bins, z, outward, deepest, heights, layers):
 def levels_in_reach(medium, bins, sweep):
     """Return the levels that a fan may reach within its horizon."""
     polar, direction, z = medium.polar, sweep.launch.direction, sweep.launch.origin.z
-    heights, layers = np.empty(MAX_LEVELS), np.empty(MAX_LEVELS, np.int64)
+    heights, layers = np.empty(MAX_LEVELS + 1), np.empty(MAX_LEVELS + 1, np.int64)
     outward = outward_of(direction, sweep.backward)
     count = layers_outward(bins, z, outward, sweep.deepest, heights, layers)
     fastest = vertical_speed(polar, direction, polar.steepest[direction]) + max_rise(medium.flow)
     furthest = fastest * sweep.horizon * IN_TIME
     while count > 1 and abs(heights[count - 2] - z) > furthest:
         count -= 1
+    if rises(medium.flow) and not bins.aligned and count > 0 and abs(heights[0] - z) > 2.0 * BACK_AGAIN:
+        for n in range(count, 0, -1):
+            heights[n], layers[n] = heights[n - 1], layers[n - 1]
+        heights[0] = z + (2.0 * outward - 1.0) * BACK_AGAIN
+        count += 1
     return Levels(heights[:count], layers[:count])
+
+
+@inlined
+def is_extra(levels, k):
+    """Return whether level k is the one that a flow that rises adds beside the origin."""
+    return k == 0 and levels.layer.size > 1 and levels.layer[0] == levels.layer[1]
 
 
 @kernel
@@ -320,6 +336,18 @@ def fill_patches(look, quarter, k):
         patches[1, 4:] = 0.0
 
 
+@kernel
+def complete_patches(look, quarter, k):
+    """Continue a quarter's patches to corners that have not landed; return whether all have a place."""
+    landing, corners, patches = look.mesh.landing, look.corners, look.patches
+    low, left = quarter // 2, quarter % 2
+    if not complete_corners(landing, corners, low, left, k, patches[0]):
+        return False
+    if look.nodes.bins.aligned or k == 0:
+        return True
+    return complete_corners(landing, corners, low, left, k - 1, patches[1])
+
+
 @inlined
 def look_into_quarter(look, cell, quarter, may_halve, rows, count):
     """Guesses for the nodes under a quarter of a cell, as `guess_in_patch` has them.
@@ -330,14 +358,19 @@ def look_into_quarter(look, cell, quarter, may_halve, rows, count):
     levels, z = look.levels, look.sweep.launch.origin.z
     bent = 0
     for k in range(levels.height.size):
-        if not (cell[CELL_LEVELS] >> k) & 1:
+        if not (cell[CELL_LEVELS] >> k) & 1 or is_extra(levels, k):
             continue
         fill_patches(look, quarter, k)
         landed = landed_corners(look.patches[0])
         if landed < 4:  # a flow that rises carries some of its controls away
+            if not look.nodes.bins.aligned:
+                # it may turn them back within the layer
+                landed = hold_corners(look.patches)
             if may_halve and landed > 0 and any_wanted_around(look.nodes, levels.layer[k], look.patches):
                 bent |= 1 << k
-            continue
+                continue
+            if landed < 4 and not complete_patches(look, quarter, k):
+                continue
         if may_halve and wants_halving(look.nodes, levels.layer[k], look.patches):
             bent |= 1 << k
             continue

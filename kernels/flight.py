@@ -22,6 +22,7 @@ from .motion import (
     rk4_lanes,
 )
 from .place import Pair, Place, Velocity
+from .terrain import open_in_box
 
 _ROWS = range(LANE_ROWS, LANE_ROWS + 20)
 LANE_LEFT, LANE_LAST = _ROWS[:2]
@@ -165,3 +166,15 @@ def stayed_inside(flow, lanes, n, t, duration):
     """Return whether the flow is surely known in all of lane n's box from time t [s] on."""
     x_lo, x_hi = lanes[LANE_X_LO, n], lanes[LANE_X_HI, n]
     return contains_box(flow, x_lo, x_hi, lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n], t, t + duration)
+
+
+@kernel
+def stayed_open(flow, terrain, lanes, n, z, z_end):
+    """Return whether the terrain surely allows all of lane n's box between two heights [m].
+
+    Of a flow with a vertical part that is not known: its path may go higher or deeper than its ends.
+    """
+    if rises(flow):
+        return False
+    x_lo, x_hi = lanes[LANE_X_LO, n], lanes[LANE_X_HI, n]
+    return open_in_box(terrain, x_lo, x_hi, lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n], min(z, z_end))

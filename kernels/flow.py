@@ -18,6 +18,9 @@ from .interpolate import pair_between, row_between
 JUST_BELOW = 1.0 - 2.0**-52
 """A factor just below 1: it puts the last point of a grid into the cell before that point."""
 
+ROUNDING = 1e-9
+"""A quick look at a box is this much stricter, in grid indices, than a look at a place, which is rounded."""
+
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
 Numbers = NDArray[np.int64]
@@ -332,14 +335,58 @@ def grid_index(index_map, x, y, x_lo, y_lo, per_x, per_y):
     return pair_between(index_map, (p, q), (a, b))
 
 
-def _ocean_grid(flow, x, y, z, t):
+@kernel
+def index_ranges(index_map, x_lo, x_hi, y_lo, y_hi, from_x, from_y, per_x, per_y):
+    """Return the least and greatest fractional indices in a box [m]: i_lo, i_hi, j_lo, j_hi; see `grid_index`.
+
+    Between the map's points the indices are bilinear, so they are greatest and least at corners of the pieces
+    into which these points cut the box.
+    """
+    p_last, q_last = index_map.shape[0] - 1.0, index_map.shape[1] - 1.0
+    p_lo, p_hi = min(max((x_lo - from_x) * per_x, 0.0), p_last), min(max((x_hi - from_x) * per_x, 0.0), p_last)
+    q_lo, q_hi = min(max((y_lo - from_y) * per_y, 0.0), q_last), min(max((y_hi - from_y) * per_y, 0.0), q_last)
+    i_lo, i_hi, j_lo, j_hi = math.inf, -math.inf, math.inf, -math.inf
+    at_p, next_p = p_lo, math.floor(p_lo) + 1.0
+    while True:
+        p, a = _cell(at_p, index_map.shape[0])
+        at_q, next_q = q_lo, math.floor(q_lo) + 1.0
+        while True:
+            q, b = _cell(at_q, index_map.shape[1])
+            i, j = pair_between(index_map, (p, q), (a, b))
+            i_lo, i_hi, j_lo, j_hi = min(i_lo, i), max(i_hi, i), min(j_lo, j), max(j_hi, j)
+            if at_q >= q_hi:
+                break
+            at_q, next_q = min(next_q, q_hi), next_q + 1.0
+        if at_p >= p_hi:
+            break
+        at_p, next_p = min(next_p, p_hi), next_p + 1.0
+    return i_lo, i_hi, j_lo, j_hi
+
+
+def _index_on_map(flow, x, y):
+    return grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
+
+
+def _at_index(flow, at_i, at_j, z, t):
     values = flow.values
-    at_i, at_j = grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
     i, a = _cell(at_i, values.shape[2])
     j, b = _cell(at_j, values.shape[3])
     k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
     n, d = _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
     return pair_between(values, (n, k, i, j), (d, c, a, b))
+
+
+def _at_index_once(flow, at_i, at_j, z):
+    values = flow.values
+    i, a = _cell(at_i, values.shape[2])
+    j, b = _cell(at_j, values.shape[3])
+    k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
+    return pair_between(values, (np.uintp(0), k, i, j), (c, a, b))
+
+
+def _ocean_grid(flow, x, y, z, t):
+    at_i, at_j = index_on_map(flow, x, y)
+    return at_index(flow, at_i, at_j, z, t)
 
 
 def _upwelling(flow, x, y, z, t):
@@ -404,13 +451,24 @@ def _in_ocean_grid(flow, x, y, t):
 
 
 def _box_in_box(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
-    known = flow.extent
+    return _in_extent(flow.extent, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi)
+
+
+@kernel
+def _in_extent(known, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
     across = known.x_lo <= x_lo and x_hi <= known.x_hi and known.y_lo <= y_lo and y_hi <= known.y_hi
     return across and known.t_lo <= t_lo and t_hi <= known.t_hi
 
 
-def _unsure(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
-    return False
+def _box_in_ocean_grid(flow, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+    known = flow.extent
+    if not _in_extent(known, x_lo, x_hi, y_lo, y_hi, t_lo, t_hi):
+        return False
+    i_lo, i_hi, j_lo, j_hi = index_ranges(
+        flow.index_map, x_lo, x_hi, y_lo, y_hi, known.x_lo, known.y_lo, flow.per_x, flow.per_y
+    )
+    i_last, j_last = flow.values.shape[2] - 1 - ROUNDING, flow.values.shape[3] - 1 - ROUNDING
+    return min(i_lo, j_lo) >= ROUNDING and i_hi <= i_last and j_hi <= j_last
 
 
 def _steady_carry(flow, z):
@@ -434,7 +492,27 @@ def _no(flow):
     return False
 
 
-def _no_rise(flow):
+def _is_of_one_time(flow):
+    return flow.extent.t_lo == -math.inf
+
+
+def _cell_size(flow):
+    return flow.extent.length_scale
+
+
+def _no_index(flow, x, y):
+    return math.nan, math.nan
+
+
+def _not_at_index(flow, at_i, at_j, z, t):
+    return math.nan, math.nan
+
+
+def _not_at_index_once(flow, at_i, at_j, z):
+    return math.nan, math.nan
+
+
+def _none(flow):
     return 0.0
 
 
@@ -477,7 +555,13 @@ class Abilities(NamedTuple):
     cycle: Callable[..., float] = _no_cycle
     current: Callable[..., Any] = _level_current
     rises: Callable[..., Any] = _no
-    max_rise: Callable[..., Any] = _no_rise
+    max_rise: Callable[..., Any] = _none
+    cell_size: Callable[..., Any] = _none
+    is_mapped: Callable[..., Any] = _no
+    has_one_time: Callable[..., Any] = _no
+    index_on_map: Callable[..., Any] = _no_index
+    at_index: Callable[..., Any] = _not_at_index
+    at_index_once: Callable[..., Any] = _not_at_index_once
 
 
 def _rising(current: Callable[..., Any], **others: Callable[..., Any]) -> Abilities:
@@ -493,13 +577,24 @@ ABILITIES: dict[type, Abilities] = {
     Jet: Abilities(_jet),
     TidalJet: Abilities(_tidal_jet, cycle=_tidal_cycle),
     Grid: Abilities(_grid, carry=_grid_carry),
-    OceanGrid: Abilities(_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle),
+    OceanGrid: Abilities(
+        _ocean_grid,
+        contains=_in_ocean_grid,
+        contains_box=_box_in_ocean_grid,
+        cycle=_ocean_cycle,
+        cell_size=_cell_size,
+        is_mapped=_yes,
+        has_one_time=_is_of_one_time,
+        index_on_map=_index_on_map,
+        at_index=_at_index,
+        at_index_once=_at_index_once,
+    ),
     Upwelling: _rising(_upwelling),
     Rolls: _rising(_rolls, cycle=_rolls_cycle),
     Abc: _rising(_abc),
     RisingGrid: _rising(_rising_grid),
     RisingOceanGrid: _rising(
-        _rising_ocean_grid, contains=_in_ocean_grid, contains_box=_unsure, cycle=_ocean_cycle
+        _rising_ocean_grid, contains=_in_ocean_grid, contains_box=_box_in_ocean_grid, cycle=_ocean_cycle
     ),
 }
 
@@ -524,6 +619,36 @@ def max_rise(flow: Flow) -> float:
     return ABILITIES[type(flow)].max_rise(flow)
 
 
+def cell_size(flow: Flow) -> float:
+    """Return the size [m] of the cells of a file's grid, within which its current is smooth; else 0."""
+    return ABILITIES[type(flow)].cell_size(flow)
+
+
+def is_mapped(flow: Flow) -> bool:
+    """Return whether `velocity` is `index_on_map`, then `at_index`; kernels know it when they are compiled."""
+    return ABILITIES[type(flow)].is_mapped(flow)
+
+
+def has_one_time(flow: Flow) -> bool:
+    """Return whether a mapped flow comes from a file of one time, so that `at_index_once` reads it faster."""
+    return ABILITIES[type(flow)].has_one_time(flow)
+
+
+def index_on_map(flow: Flow, x: float, y: float) -> tuple[float, float]:
+    """Return the fractional indices of a place [m] on a mapped flow's grid."""
+    return ABILITIES[type(flow)].index_on_map(flow, x, y)
+
+
+def at_index(flow: Flow, at_i: float, at_j: float, z: float, t: float) -> tuple[float, float]:
+    """Return the current (u, v) [m/s] of a mapped flow at fractional indices, a height [m] and a time [s]."""
+    return ABILITIES[type(flow)].at_index(flow, at_i, at_j, z, t)
+
+
+def at_index_once(flow: Flow, at_i: float, at_j: float, z: float) -> tuple[float, float]:
+    """Return `at_index` of a flow that `has_one_time`: the same bits, without a look at its times."""
+    return ABILITIES[type(flow)].at_index_once(flow, at_i, at_j, z)
+
+
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
     """Return whether the flow is known at (x, y) [m] and time t [s]."""
     return ABILITIES[type(flow)].contains(flow, x, y, t)
@@ -545,7 +670,9 @@ def carry(flow: Flow, z: float) -> float:
     return ABILITIES[type(flow)].carry(flow, z)
 
 
-for _ability in (velocity, current, rises, max_rise, contains, contains_box, carry):
+_PUBLIC = (velocity, current, rises, max_rise, contains, contains_box, carry)
+_ON_MAPS = (cell_size, is_mapped, has_one_time, index_on_map, at_index, at_index_once)
+for _ability in (*_PUBLIC, *_ON_MAPS):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
 
 

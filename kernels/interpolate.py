@@ -22,7 +22,9 @@ _INT = ir.IntType(32)
 
 
 def _between(values, cell, weight):
-    block = values[tuple(slice(int(c), int(c) + 2) for c in cell)]
+    read_at = len(cell) - len(weight)
+    index = [int(c) for c in cell]
+    block = values[(*index[:read_at], *(slice(c, c + 2) for c in index[read_at:]))]
     for w in weight:
         block = block[0] + w * (block[1] - block[0])
     return block
@@ -31,7 +33,8 @@ def _between(values, cell, weight):
 def pair_between(values: Any, cell: Any, weight: Any) -> tuple[float, float]:
     """The pair at a fractional index: values (n_1, ..., n_d, 2), cell (d,) unsigned, weight (d,) of cell + 1.
 
-    Nothing is checked: each cell must be below n - 1.
+    With fewer weights the first axes are read at their cell. Nothing is checked: each cell must be below n - 1,
+    and below n along an axis without a weight.
     """
     u, v = _between(values, cell, weight)
     return u, v
@@ -76,10 +79,13 @@ def _in_registers(count):
             below, weights = (cgutils.unpack_tuple(builder, part) for part in arguments[1:])
             nothing = ir.Constant(below[0].type, 0)
             above = [builder.add(index, ir.Constant(index.type, 1)) for index in below]
-            apart = axes - 1 if count == 2 else axes  # two pairs, neighbours along the last axis, fill a register
+            fixed = axes - len(weights)
+            # two pairs, neighbours along the last axis, fill a register
+            apart = len(weights) - 1 if count == 2 else len(weights)
             rows = []
             for corner in itertools.product((below, above), repeat=apart):
-                index = [ends[n] for n, ends in enumerate(corner)] + below[apart:] + [nothing]
+                ends = [corner[n][fixed + n] for n in range(apart)]
+                index = [*below[:fixed], *ends, *below[fixed + apart :], nothing]
                 rows.append(_four_at(context, builder, array, shape, strides, layout, index))
             for n in range(apart):
                 half = len(rows) // 2
@@ -98,7 +104,7 @@ def _in_registers(count):
 
 def _fits(values, cell, weight):
     plain = values.dtype == types.float64 and values.layout == "C"
-    return plain and values.ndim - 1 == len(cell) == len(weight)
+    return plain and values.ndim - 1 == len(cell) >= len(weight)
 
 
 _pair_between: Any = intrinsic(_in_registers(2))

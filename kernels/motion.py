@@ -6,9 +6,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .cache import entry_point, in_kernels, inlined, kernel, making
-from .flow import Flow, by_rise, carry, contains, current, rises, velocity
+from .flow import (
+    Flow,
+    at_index,
+    at_index_once,
+    by_rise,
+    carry,
+    contains,
+    current,
+    has_one_time,
+    index_on_map,
+    is_mapped,
+    rises,
+    velocity,
+)
 from .place import Place
-from .terrain import allowed, open_between
+from .terrain import allowed, open_in_box
 
 CROSSED = 1e-7
 """A path has reached a height at this distance [m] from it."""
@@ -229,12 +242,17 @@ def is_clear(flow, terrain, start, through, duration, dt, spacing):
 
     Where the flow rises, a leg may also not leave the water: the flow may lift a glider at first.
     """
-    if not rises(flow) and open_between(terrain, start.z, start.z + through.w * duration):
+    z_end = start.z + through.w * duration
+    if not rises(flow) and open_in_box(terrain, -math.inf, math.inf, -math.inf, math.inf, min(start.z, z_end)):
         return True
     rows = trace(flow, start, through, duration, dt)
     for n in range(rows.shape[0] - 1):
         _, ax, ay, az = rows[n]
         _, bx, by, bz = rows[n + 1]
+        if not rises(flow) and open_in_box(
+            terrain, min(ax, bx), max(ax, bx), min(ay, by), max(ay, by), min(az, bz)
+        ):
+            continue
         looks = math.ceil(math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2) / spacing)
         for look in range(looks + 1):
             s = look / max(looks, 1)
@@ -255,9 +273,43 @@ LANE_ROWS = 20
 """The rows above and the stages' own; a caller's lanes may have more."""
 
 
+@inlined
+def _mapped_slopes(flow, flat, x, y, share, u, v):
+    """As `_slopes`: all indices first, into rows u, v, then all currents; small loops keep more in registers.
+
+    A question for each lane whether the flow has one time would cost more than it saves.
+    """
+    for n in range(LANES):
+        flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = index_on_map(
+            flow, flat[np.uintp(x * LANES + n)], flat[np.uintp(y * LANES + n)]
+        )
+    if has_one_time(flow):
+        for n in range(LANES):
+            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+            flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_index_once(
+                flow,
+                flat[np.uintp(u * LANES + n)],
+                flat[np.uintp(v * LANES + n)],
+                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
+            )
+    else:
+        for n in range(LANES):
+            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+            flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_index(
+                flow,
+                flat[np.uintp(u * LANES + n)],
+                flat[np.uintp(v * LANES + n)],
+                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
+                flat[np.uintp(LANE_T * LANES + n)] + along,
+            )
+
+
 @kernel
 def _slopes(flow, flat, x, y, share, u, v):
     """Currents of all lanes at rows x, y into rows u, v, at `share` of the step in depth and time."""
+    if is_mapped(flow):
+        _mapped_slopes(flow, flat, x, y, share, u, v)
+        return
     for n in range(LANES):
         along = share * flat[np.uintp(LANE_STEP * LANES + n)]
         flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = velocity(

@@ -181,6 +181,41 @@ def landed_corners(patch):
 
 
 @kernel
+def hold_corners(patches):
+    """Put corners of a patch that have not landed where they were a level before; return how many have one."""
+    for c in range(4):
+        if math.isnan(patches[0, c, 2]):
+            for m in range(3):
+                patches[0, c, m] = patches[1, c, m]
+    return landed_corners(patches[0])
+
+
+@kernel
+def complete_corners(landing, corners, i, j, level, patch):
+    """Continue quarter (i, j) of a halved cell to corners that have not landed; return whether all have a place.
+
+    By the other three corners, or along a side by a vertex beyond.
+    """
+    landed = 0
+    for c in range(4):
+        landed |= (not math.isnan(patch[c, 2])) << c
+    for c in range(4):
+        if landed >> c & 1:
+            continue
+        beside, along = landed >> (c ^ 1) & 1, landed >> (c ^ 2) & 1
+        row, column = i + c // 2, j + c % 2
+        for m in range(3):
+            at = LANDING_COLUMNS * level + m
+            if beside and along and landed >> (3 - c) & 1:
+                patch[c, m] = patch[c ^ 1, m] + patch[c ^ 2, m] - patch[3 - c, m]
+            elif along and row != 1:
+                patch[c, m] = 2.0 * patch[c ^ 2, m] - landing[corners[3 * (2 - row) + column], at]
+            elif beside and column != 1:
+                patch[c, m] = 2.0 * patch[c ^ 1, m] - landing[corners[3 * row + 2 - column], at]
+    return landed_corners(patch) == 4
+
+
+@kernel
 def _around(bins, patches):
     """The box about a patch, and about its start where nodes lie between."""
     x_lo, x_hi, y_lo, y_hi = math.inf, -math.inf, math.inf, -math.inf

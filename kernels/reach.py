@@ -23,8 +23,8 @@ from .edges import (
     store,
 )
 from .fan import FAN_ROWS, Launch, Sweep, fan_guesses, outward_of
-from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, widen
-from .flow import Array, Numbers, contains, rises
+from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, stayed_open, widen
+from .flow import Array, Numbers, cell_size, contains, rises
 from .motion import LANES, is_clear, stays_inside
 from .patch import (
     GUESS_ANGLE,
@@ -59,6 +59,8 @@ MAX_TRIES = 12
 FAN_STEP = 8.0
 """The step of a fan as a multiple of the step of a leg; it may be longer, because a fan gives only first
 guesses."""
+FAN_SHARE = 0.125
+"""In a file's grid a fan's step may last as long as the fastest glider takes for this share of a cell."""
 SPARE, LONGER = 1.3, 1.2
 """A deadline should suffice for SPARE times the limit; each is at least LONGER times the one before."""
 LATEST = 1.1
@@ -136,7 +138,8 @@ def checked_leg(medium, lanes, n):
         return no_edge(NO_HIT)
     if not (stayed_inside(flow, lanes, n, start.t, time) or stays_inside(flow, start, c, time, dt)):
         return no_edge(NO_HIT)
-    if not is_clear(flow, medium.terrain, start, c, time, dt, CLEARANCE_SPACING):
+    open_water = stayed_open(flow, medium.terrain, lanes, n, start.z, start.z + c.w * time)
+    if not (open_water or is_clear(flow, medium.terrain, start, c, time, dt, CLEARANCE_SPACING)):
         return no_edge(BLOCKED)
     return Edge(
         CONNECTED, time, edge_cost(medium.cost, time), c.glide_angle, c.heading, c.speed, lanes[AIM_MISS, n]
@@ -380,9 +383,10 @@ def horizon_of(medium):
 @kernel
 def launch_of(medium, points, task):
     """Return the fan of a task, with the steps of a fan."""
-    origin = place_of(points, int(task[TASK_ORIGIN]))
-    longest = FLOWN * task[TASK_DEADLINE]
-    return Launch(origin, int(task[TASK_DIRECTION]), medium.integration.dt * FAN_STEP, longest)
+    origin, direction = place_of(points, int(task[TASK_ORIGIN])), int(task[TASK_DIRECTION])
+    fastest = medium.flow.extent.max_speed + medium.polar.best_horizontal[direction]
+    step = max(medium.integration.dt * FAN_STEP, FAN_SHARE * cell_size(medium.flow) / fastest)
+    return Launch(origin, direction, step, FLOWN * task[TASK_DEADLINE])
 
 
 @making

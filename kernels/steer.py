@@ -15,8 +15,13 @@ FIRST_STEP = 3.0
 MAX_ITERATIONS = 14
 GIVE_UP = 5
 """A guess is given up if it has not reduced its miss to a quarter by this iteration."""
+SLOWER = 3
+"""In a flow that rises it may take so many times the iterations: where a path turns, the map is as a root is."""
 FLOWN = 1.25
 """In a flow that rises a control flies for this multiple of the horizon at most."""
+STEEPER, STEEPENED = 0.03, 4.0
+"""In a flow that rises a first guess that never reaches its target's depth is made steeper by this much [rad], so
+many times at most; a later control goes half the way back to the one before it."""
 MAX_TURN = 0.35
 """Longest step in glide angle and heading [rad]: beyond it the map is no longer the guess's."""
 
@@ -84,6 +89,13 @@ def correct(medium, lanes, n):
     miss = math.hypot(off_x, off_y)
     lanes[AIM_MISS, n] = miss
     iteration = lanes[_ITERATION, n]
+    patience = 1
+    if rises(medium.flow):
+        if not miss < math.inf and turned_back(medium, lanes, n, iteration):
+            return
+        iteration = iteration if iteration >= 1.0 else 0.0
+        lanes[_ITERATION, n] = iteration
+        patience = SLOWER
     if miss <= LANDING_TOLERANCE and miss < integration.tolerance and iteration > 0.0:
         lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
         lanes[AIM_STATE, n] = HIT
@@ -93,6 +105,11 @@ def correct(medium, lanes, n):
         lanes[_FIRST_MISS, n] = miss
     else:
         broyden(lanes, n, off_x - lanes[AIM_OFF_X, n], off_y - lanes[AIM_OFF_Y, n])
+        if rises(medium.flow) and miss > math.hypot(lanes[AIM_OFF_X, n], lanes[AIM_OFF_Y, n]):
+            # go on from the control before, with what has been learnt
+            off_x, off_y = lanes[AIM_OFF_X, n], lanes[AIM_OFF_Y, n]
+            lanes[AIM_ANGLE, n] -= lanes[AIM_TURN_A, n]
+            lanes[AIM_HEADING, n] -= lanes[AIM_TURN_H, n]
     lanes[AIM_OFF_X, n], lanes[AIM_OFF_Y, n] = off_x, off_y
     turn_a = -(lanes[AIM_INVERSE, n] * off_x + lanes[AIM_INVERSE + 1, n] * off_y)
     turn_h = -(lanes[AIM_INVERSE + 2, n] * off_x + lanes[AIM_INVERSE + 3, n] * off_y)
@@ -102,8 +119,8 @@ def correct(medium, lanes, n):
     lanes[AIM_TURN_A, n], lanes[AIM_TURN_H, n] = angle - lanes[AIM_ANGLE, n], shorten * turn_h
     # give up after a second step beyond the end of the glide polar, or if there is no step
     stuck = iteration > 0.0 and lanes[AIM_TURN_A, n] == 0.0 and (turn_a != 0.0 or turn_h == 0.0)
-    astray = iteration == GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
-    if stuck or astray or iteration == MAX_ITERATIONS - 1 or not miss < math.inf:
+    astray = iteration == patience * GIVE_UP and miss > 0.25 * lanes[_FIRST_MISS, n]
+    if stuck or astray or iteration == patience * MAX_ITERATIONS - 1 or not miss < math.inf:
         lanes[AIM_STATE, n] = LOST
         rest(lanes, n)
         return
@@ -111,6 +128,29 @@ def correct(medium, lanes, n):
     lanes[AIM_HEADING, n] += shorten * turn_h
     lanes[_ITERATION, n] += 1.0
     take_off(medium, lanes, n, integration.dt)
+
+
+@kernel
+def turned_back(medium, lanes, n, iteration):
+    """Send lane n, which the water has kept from its target's depth, off on a control that is more likely there.
+
+    False if enough of them have been tried.
+    """
+    if iteration >= 1.0:
+        lanes[AIM_TURN_A, n], lanes[AIM_TURN_H, n] = 0.5 * lanes[AIM_TURN_A, n], 0.5 * lanes[AIM_TURN_H, n]
+        lanes[AIM_ANGLE, n] -= lanes[AIM_TURN_A, n]
+        lanes[AIM_HEADING, n] -= lanes[AIM_TURN_H, n]
+        lanes[_ITERATION, n] = iteration + 1.0
+    else:
+        steepest = medium.polar.steepest[int(lanes[AIM_DIRECTION, n])]
+        if lanes[AIM_ANGLE, n] >= steepest:
+            return False
+        lanes[AIM_ANGLE, n] = min(lanes[AIM_ANGLE, n] + STEEPER, steepest)
+        lanes[_ITERATION, n] = iteration + 1.0 / (STEEPENED + 1.0)
+    if lanes[_ITERATION, n] > SLOWER * MAX_ITERATIONS - 1.0 or (iteration < 1.0 <= lanes[_ITERATION, n] + 1e-9):
+        return False
+    take_off(medium, lanes, n, medium.integration.dt)
+    return True
 
 
 @inlined

@@ -1,12 +1,18 @@
 """Terrain: the places where a glider may be. Seabed and land are given as the height of the bottom."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .cache import in_kernels
-from .flow import Array, grid_index
+from .flow import ROUNDING, Array, grid_index, index_ranges
+
+MOST_CELLS = 1024
+"""A quick look at a box reads at most so many cells of a seabed; a larger box is left to the exact look."""
+HEIGHT_ROUNDING = 1e-6
+"""A quick look asks for this much more water [m] than the exact look, whose heights are rounded."""
 
 
 class OpenWater(NamedTuple):
@@ -58,20 +64,40 @@ def allowed(terrain: Terrain, x: float, y: float, z: float) -> bool:
 in_kernels(allowed, _ALLOWED)
 
 
-def _open_between(terrain, z, z_end):
-    return min(z, z_end) >= terrain.floor
+def _open_water_in_box(terrain, x_lo, x_hi, y_lo, y_hi, z):
+    return z >= terrain.floor
 
 
-def _unsure(terrain, z, z_end):
-    return False
+def _seabed_below_box(terrain, x_lo, x_hi, y_lo, y_hi, z):
+    if not x_hi - x_lo + y_hi - y_lo < math.inf:
+        return False
+    i_lo, i_hi, j_lo, j_hi = index_ranges(
+        terrain.index_map, x_lo, x_hi, y_lo, y_hi, terrain.x_lo, terrain.y_lo, terrain.per_x, terrain.per_y
+    )
+    ni, nj = terrain.bottom.shape
+    i_first, i_last = max(int(i_lo + 0.5 - ROUNDING), 0), min(int(i_hi + 0.5 + ROUNDING), ni - 1)
+    j_first, j_last = max(int(j_lo + 0.5 - ROUNDING), 0), min(int(j_hi + 0.5 + ROUNDING), nj - 1)
+    i_first, j_first = min(i_first, ni - 1), min(j_first, nj - 1)
+    i_last, j_last = max(i_last, 0), max(j_last, 0)
+    if (i_last - i_first + 1) * (j_last - j_first + 1) > MOST_CELLS:
+        return False
+    for i in range(i_first, i_last + 1):
+        for j in range(j_first, j_last + 1):
+            bottom = terrain.bottom[i, j]
+            if bottom >= 0.0 or z - HEIGHT_ROUNDING < bottom + terrain.clearance:
+                return False
+    return True
 
 
-_OPEN_BETWEEN: dict[type, Callable[..., Any]] = {OpenWater: _open_between, Seabed: _unsure}
+_OPEN_IN_BOX: dict[type, Callable[..., Any]] = {OpenWater: _open_water_in_box, Seabed: _seabed_below_box}
 
 
-def open_between(terrain: Terrain, z: float, z_end: float) -> bool:
-    """Return whether all water between two heights [m] is surely allowed; a quick check before an exact one."""
-    return _OPEN_BETWEEN[type(terrain)](terrain, z, z_end)
+def open_in_box(terrain: Terrain, x_lo: float, x_hi: float, y_lo: float, y_hi: float, z: float) -> bool:
+    """Return whether all water in a box [m] above z [m] is surely allowed; a quick look before an exact one.
+
+    Without a box, from -inf to inf, a `Seabed` is not sure.
+    """
+    return _OPEN_IN_BOX[type(terrain)](terrain, x_lo, x_hi, y_lo, y_hi, z)
 
 
-in_kernels(open_between, _OPEN_BETWEEN)
+in_kernels(open_in_box, _OPEN_IN_BOX)

@@ -84,6 +84,9 @@ def test_plot_is_the_command(tmp_path, capsys):
     planner.plot(file, route, tmp_path / "call.png")
     assert command(capsys, "plot", file, path, "-o", tmp_path / "command.png").code == 0
     assert (tmp_path / "call.png").read_bytes() == (tmp_path / "command.png").read_bytes()
+    # a path alone knows what it was made with
+    assert command(capsys, "plot", path, "-o", tmp_path / "alone.png").code == 0
+    assert (tmp_path / "alone.png").read_bytes() == (tmp_path / "call.png").read_bytes()
 
 
 def test_a_query_in_memory_is_one_from_the_file(tmp_path):

@@ -146,13 +146,17 @@ def plot(
     chart: bool,
     fronts: float | None,
 ) -> None:
-    """Draw the route in PATHS, or ROADMAP.
+    """Draw the routes in PATHS, or ROADMAP.
 
-    PATHS are JSON files from `query`. One route is drawn over ROADMAP's current, two to four are drawn side by
-    side; without PATHS, the roadmap is drawn.
+    PATHS are JSON files from `query` or `plan`. One route is drawn over ROADMAP's current, two to four are drawn
+    side by side; without PATHS, the roadmap is drawn. ROADMAP may also be a scenario, or it is left out: then the
+    first of PATHS says what it was planned with.
     """
     from .. import planner
+    from ..opened import is_plan
 
+    if is_plan(roadmap):
+        paths = (roadmap, *paths)
     if len(paths) > 1:
         if chart or fronts is not None or len(depths) > 1:
             raise click.UsageError(

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
-from ..kernels.cache import entry_point
-from ..kernels.flow import Flow, contains
-from ..kernels.motion import rk4_step
+from ..kernels.cache import entry_point, in_kernels, kernel
+from ..kernels.flow import Flow, by_rise, contains, rises
+from ..kernels.motion import landing_in_step, rk4_rising, rk4_step
 from ..kernels.place import Place, Velocity
 from ..kernels.terrain import Terrain, allowed
 
@@ -25,9 +25,13 @@ class End(IntEnum):
     """The terrain does not allow the next place."""
     OUTSIDE = 3
     """The current is not known there."""
+    CARRIED = 4
+    """The water rises or sinks so fast that it did not come to its depth in LATEST times the still time."""
 
 
-DEPTH, REACHED, BLOCKED, OUTSIDE = (int(end) for end in End)
+DEPTH, REACHED, BLOCKED, OUTSIDE, CARRIED = (int(end) for end in End)
+LATEST = 8.0
+"""In water that rises a glide to a depth may take this many times what it takes in still water."""
 
 
 class Motion(NamedTuple):
@@ -97,6 +101,41 @@ def heading_to(x, y, u, v, speed):  # type: ignore[no-untyped-def]
     return math.atan2(ey * along - ex * across, ex * along + ey * across)
 
 
+Stepped = tuple[float, float, float, float, bool]
+
+
+def _step(flow: Flow, here: Place, through: Velocity, step: float, depth: float) -> Stepped:
+    """Return the place x, y, z [m] after a step, its length [s], and whether the glide is at its depth."""
+    return _STEP[rises(flow)](flow, here, through, step, depth)
+
+
+def _step_level(flow: Flow, here: Place, through: Velocity, step: float, depth: float) -> Stepped:
+    x, y = rk4_step(flow, here, through, step)
+    return x, y, here.z + through.w * step, step, False
+
+
+def _step_rising(flow: Flow, here: Place, through: Velocity, step: float, depth: float) -> Stepped:
+    x, y, z = rk4_rising(flow, here, through, step)
+    if through.w == 0.0:  # it stays at its depth
+        return x, y, here.z, step, False
+    way = 1.0 if through.w > 0.0 else -1.0
+    if (z - depth) * way >= 0.0 and (here.z - depth) * way < 0.0:
+        x, y, since = landing_in_step(flow, here, z, through, step, depth)
+        return x, y, depth, since, True
+    return x, y, min(z, 0.0), step, False  # nothing lifts a vehicle above the surface
+
+
+_STEP = (_step_level, _step_rising)
+in_kernels(_step, by_rise(*_STEP))
+
+
+@kernel
+def _longest(flow, start, depth, duration, w):  # type: ignore[no-untyped-def]
+    """Return how long [s] a glide may last."""
+    still = duration if w == 0.0 else max((depth - start.z) / w, 0.0)
+    return LATEST * still if rises(flow) and w != 0.0 else still
+
+
 @entry_point()
 def fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows):  # type: ignore[no-untyped-def]
     """Fly from `start` (a Place) to a height `depth` [m], or for a `duration` [s] if `motion.w` is 0.
@@ -106,7 +145,7 @@ def fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows):  
     here, count, ended, stop = start, 1, DEPTH, aim.first
     rows[0] = start.t, start.x, start.y, start.z
     x, y, own_x, own_y, true_x, true_y = belief.x, belief.y, 0.0, 0.0, 0.0, 0.0
-    left = duration if motion.w == 0.0 else max((depth - start.z) / motion.w, 0.0)
+    left = _longest(flow, start, depth, duration, motion.w)
     heading, steers = aim.heading, aim.stops.shape[0] > 0
     while left > 0.0:
         if steers:
@@ -124,9 +163,10 @@ def fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows):  
         step = min(dt, left)
         true = heading + motion.turn
         through = Velocity(motion.horizontal * math.cos(true), motion.horizontal * math.sin(true), motion.w)
-        east, north = rk4_step(flow, here, through, step)
-        left -= step
-        height = depth if left <= 0.0 and motion.w != 0.0 else here.z + motion.w * step
+        east, north, height, step, there = _step(flow, here, through, step, depth)
+        left = 0.0 if there else left - step
+        if left <= 0.0 and motion.w != 0.0 and not rises(flow):
+            height = depth
         if not allowed(terrain, east, north, height):
             ended = BLOCKED
             break
@@ -137,6 +177,8 @@ def fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows):  
         x, y = x + (forward_x + belief.u) * step, y + (forward_y + belief.v) * step
         rows[count] = here.t, here.x, here.y, here.z
         count += 1
+    if rises(flow) and ended == DEPTH and (depth - here.z) * motion.w > 0.0:
+        ended = CARRIED
     return count, ended, x, y, own_x, own_y, stop, true_x, true_y
 
 
@@ -153,6 +195,7 @@ def glided(
 ) -> Glided:
     """Return a glide as `fly` flies it; `dt` [s] is the longest step."""
     time = duration if motion.w == 0.0 else max((depth - start.z) / motion.w, 0.0)
+    time *= LATEST if rises(flow) else 1.0
     rows = np.empty((int(time / dt) + 3, 4))
     count, *rest = fly(flow, terrain, start, depth, duration, motion, belief, aim, dt, rows)
     return Glided(rows[:count].copy(), *rest)

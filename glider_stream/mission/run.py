@@ -14,7 +14,7 @@ from .settings import Mission
 from .vehicle import Phase, Vehicle
 from .world import Worlds, seeds_of
 
-ENDS = ("arrived", "out of time", "missed the goal", "aground", "left the domain", "no plan")
+ENDS = ("arrived", "out of time", "missed the goal", "aground", "left the domain", "no plan", "carried away")
 """How runs end. "missed the goal": the list was flown to its end elsewhere, and the policy makes no other."""
 
 

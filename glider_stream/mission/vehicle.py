@@ -18,6 +18,8 @@ from .orders import Orders, Trim, Trims, Waypoints, is_up
 from .settings import VehicleSettings
 
 NOWHERE = np.empty((0, 2))
+LOST = {int(End.OUTSIDE): "left the domain", int(End.CARRIED): "carried away"}
+"""How a vehicle is lost whose glide ends so, anywhere."""
 SHALLOWEST = 10.0
 """A vehicle begins no yo that has room or time for less depth than this [m]."""
 
@@ -26,7 +28,8 @@ SHALLOWEST = 10.0
 class Phase:
     """A part of a run, a dive, a climb or a drift: rows [t, x, y, z], and the mean glide that it was in truth.
 
-    `glide_angle` (signed) and `heading` [rad], `speed` through water [m/s]; all 0 in a drift.
+    `glide_angle` (signed) and `heading` [rad], `speed` through water [m/s]; all 0 in a drift. Where the water
+    rises, its rise counts as the vehicle's.
     """
 
     rows: Array
@@ -81,7 +84,7 @@ class Vehicle:
     spent: float = 0.0
     surfacings: int = 0
     lost: str = ""
-    """How the run has ended if the vehicle is lost: "aground" or "left the domain"."""
+    """How the run has ended if the vehicle is lost: "aground", or one of LOST."""
     touched: int = 0
     """Dives that the seabed's clearance has cut short."""
     dives: tuple[Dive, ...] = ()
@@ -187,8 +190,8 @@ class Vehicle:
             self.spent += self.energy.hotel * float(rows[-1, 0] - rows[0, 0]) + self.energy.trim
             pump = self.energy.inflection(rows[0, 3])
             self.spent += float(pump) if climbs and pump is not None else 0.0
-        if flown.ended == End.OUTSIDE:
-            self.lost = "left the domain"
+        if flown.ended in LOST:
+            self.lost = LOST[flown.ended]
         elif flown.ended == End.BLOCKED and (climbs or len(rows) == 1 or self._on_ground()):
             # a dive that meets the seabed's clearance turns, as with an altimeter; nothing else can
             self.lost = "aground"

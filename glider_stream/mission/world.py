@@ -9,10 +9,11 @@ from scipy.ndimage import map_coordinates
 from ..base.arrays import Array
 from ..base.settings import require
 from ..kernels import flow as kernel
-from ..kernels.flow import velocities
+from ..kernels.flow import currents, velocities
 from ..roadmap.problem import Problem
-from ..water.inspect import divergence_ratio, is_steady, require_level
+from ..water.inspect import divergence_ratio, is_steady
 from ..water.ocean.flow import grid_flow, slots
+from ..water.ocean.vertical import with_rise
 from ..water.sampled import sample_flow
 from .error_field import OnMesh, error_field
 from .settings import ForecastError, Mission
@@ -70,21 +71,9 @@ class Worlds:
         self.mission = mission
         self.true = (mission.truth or mission.scenario).problem()
         forecast = mission.scenario.problem() if mission.truth is not None else self.true
-        until = self.true.departure + mission.arrival.longest
         for name, problem in (("true current", self.true), ("forecast", forecast)):
-            require_level(problem.evaluator.flow, f"a mission's {name}")
-            known = problem.evaluator.flow.extent
-            cure = "shorten `arrival.longest_hours`, or leave earlier"
-            why = f"a run may last until {until:g} s, and the {name} is known until {known.t_hi:g} s; {cure}"
-            require(until <= known.t_hi, why)
-        for name in ("start", "goal"):
-            point = getattr(self.true, name)
-            why = f"a mission needs `query.{name}` in its scenario; add it"
-            require(point is not None, why)
-            assert point is not None
-            self.true.check_point(point, name)
-            up = float(point[2]) == 0.0
-            require(up, f"a mission begins and ends at the surface; got a {name} at a depth of {-point[2]:g} m")
+            check_known(problem, mission, name)
+        check_ends(self.true)
         self._sample = _points(self.true, mission.arrival.longest)
         self._speed = _rms(self._read(self.true.evaluator.flow))
         self._fixed = None if mission.truth is None else self._made(forecast, 0.0)
@@ -118,6 +107,26 @@ class Worlds:
         return World(true, forecast, error, self._speed, off, divergence_ratio(flow, *sides, true.departure))
 
 
+def check_known(problem: Problem, mission: Mission, name: str) -> None:
+    """Raise InputError unless a current, `name` in words, is known for the time of a run."""
+    known, until = problem.evaluator.flow.extent, problem.departure + mission.arrival.longest
+    cure = "shorten `arrival.longest_hours`, or leave earlier"
+    why = f"a run may last until {until:g} s, and the {name} is known until {known.t_hi:g} s; {cure}"
+    require(until <= known.t_hi, why)
+
+
+def check_ends(problem: Problem) -> None:
+    """Raise InputError unless a mission's scenario names a start and a goal, both at the surface."""
+    for name in ("start", "goal"):
+        point = getattr(problem, name)
+        why = f"a mission needs `query.{name}` in its scenario; add it"
+        require(point is not None, why)
+        assert point is not None
+        problem.check_point(point, name)
+        up = float(point[2]) == 0.0
+        require(up, f"a mission begins and ends at the surface; got a {name} at a depth of {-point[2]:g} m")
+
+
 def rms_speed(problem: Problem, longest: float) -> float:
     """Return the rms speed [m/s] of a problem's current over its water and a time `longest` [s]."""
     return _rms(np.asarray(velocities(problem.evaluator.flow, *_points(problem, longest))))
@@ -142,18 +151,18 @@ def with_error(true: Problem, field: OnMesh, settings: ForecastError, longest: f
     """Return the true current with an error, on a grid that the kernels read like any other flow.
 
     If the true current is on a grid, it stays on that grid; a formula is put on one that is fine enough for the
-    error and for the current.
+    error and for the current. A vertical part has no error.
     """
     flow = true.evaluator.flow
     times = _times(flow, settings, true.departure, longest)
-    if isinstance(flow, kernel.Grid) and times.size == 1:
+    if isinstance(flow, kernel.Grid | kernel.RisingGrid) and times.size == 1:
         x, y, z = _axes(flow)
         mesh = np.meshgrid(x, y, indexing="ij")
         error = field.on_mesh(mesh[0].ravel(), mesh[1].ravel(), z, times)
-        return _regridded(flow, flow.values + error.reshape(flow.values.shape))
-    if isinstance(flow, kernel.OceanGrid):
+        return _regridded(flow, _added(flow.values, error))
+    if isinstance(flow, kernel.OceanGrid | kernel.RisingOceanGrid):
         return _ocean_with_error(flow, field, times)
-    if isinstance(flow, kernel.Grid):
+    if isinstance(flow, kernel.Grid | kernel.RisingGrid):
         x, y, z = _axes(flow)
     else:
         x, y, z = _fitting_axes(true, settings)
@@ -169,7 +178,18 @@ def with_error(true: Problem, field: OnMesh, settings: ForecastError, longest: f
     current = velocities(flow, points[2], points[3], points[1], points[0])
     total = (current.reshape(error.shape) + error).reshape(times.size, z.size, x.size, y.size, 2)
     u, v = np.moveaxis(total, -1, 0).transpose(0, 1, 2, 4, 3)
-    return grid_flow(x, y, z, u, v, times)[0]
+    level = grid_flow(x, y, z, u, v, times)[0]
+    if not kernel.rises(flow):
+        return level
+    w = currents(flow, points[2], points[3], points[1], points[0])[:, 2].reshape(*total.shape[:-1], 1)
+    return with_rise(level, np.concatenate([total, w, np.zeros_like(w)], axis=-1), level.levels)
+
+
+def _added(values: Array, error: Array) -> Array:
+    """Return a grid's values (..., 2 or 4) [m/s] with an error of u and v added."""
+    with_it = values.copy()
+    with_it[..., :2] += error.reshape(*values.shape[:-1], 2)
+    return with_it
 
 
 def _times(flow: kernel.Flow, settings: ForecastError, departure: float, longest: float) -> Array:
@@ -179,18 +199,19 @@ def _times(flow: kernel.Flow, settings: ForecastError, departure: float, longest
     steps = [longest]
     if not isinstance(settings.time_s, str):
         steps.append(settings.time_s / PER_LENGTH)
-    period = None if is_steady(flow) else getattr(flow, "period", None)
+    moves = isinstance(flow, kernel.Rolls) and not is_steady(flow)
+    period = kernel.cycle(flow) if moves else None if is_steady(flow) else getattr(flow, "period", None)
     if period is not None:
         steps.append(period / PER_PERIOD)
     count = max(2, math.ceil(longest / min(steps)) + 1)
     times = np.linspace(departure, departure + longest, count)
-    if isinstance(flow, kernel.OceanGrid) and not is_steady(flow):
+    if isinstance(flow, kernel.OceanGrid | kernel.RisingOceanGrid) and not is_steady(flow):
         inside = (flow.times > departure) & (flow.times < departure + longest)
         times = np.unique(np.concatenate([times, flow.times[inside]]))
     return times
 
 
-def _axes(flow: kernel.Grid) -> tuple[Array, Array, Array]:
+def _axes(flow: kernel.Grid | kernel.RisingGrid) -> tuple[Array, Array, Array]:
     """Return the x, y and z [m] of a grid's points."""
     known, (levels, nx, ny, _) = flow.extent, flow.values.shape
     z = flow.z_first + np.arange(levels) / flow.per_z
@@ -214,6 +235,8 @@ def _fitting_axes(true: Problem, settings: ForecastError) -> tuple[Array, Array,
     deep = math.inf if isinstance(settings.depth_m, str) else settings.depth_m / PER_LENGTH
     if isinstance(evaluator.flow, kernel.Vortices):
         deep = min(deep, float(evaluator.flow.thickness.min()) / PER_LENGTH)
+    if kernel.rises(evaluator.flow):
+        deep = min(deep, known.length_scale / PER_LENGTH)
     return x, y, _axis(float(true.lo[2]), 0.0, deep)
 
 
@@ -227,24 +250,29 @@ def _check_size(points: int) -> None:
     require(points <= MOST_POINTS, why)
 
 
-def _regridded(flow: kernel.Grid, values: Array) -> kernel.Grid:
+def _regridded(flow: kernel.Grid | kernel.RisingGrid, values: Array) -> kernel.Flow:
     """Return a grid with other values, and the bounds of speed that belong to them."""
     level_speed = np.hypot(values[..., 0], values[..., 1]).max(axis=(1, 2))
+    known = flow.extent._replace(max_speed=float(level_speed.max()))
+    if isinstance(flow, kernel.RisingGrid):
+        return flow._replace(values=np.ascontiguousarray(values), extent=known)
     carry = np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 / flow.per_z)
     return flow._replace(
         values=np.ascontiguousarray(values),
         level_speed=level_speed,
         level_carry=np.concatenate([[0.0], carry]),
-        extent=flow.extent._replace(max_speed=float(level_speed.max())),
+        extent=known,
     )
 
 
-def _ocean_with_error(flow: kernel.OceanGrid, field: OnMesh, times: Array) -> kernel.OceanGrid:
+def _ocean_with_error(
+    flow: kernel.OceanGrid | kernel.RisingOceanGrid, field: OnMesh, times: Array
+) -> kernel.Flow:
     """Return an ocean grid with an error on its own points, at some times [s]."""
     _check_size(times.size * flow.values[0, ..., 0].size)
     x, y = _grid_places(flow)
     error = field.on_mesh(x.ravel(), y.ravel(), flow.levels, times)
-    values = _at_times(flow, times) + error.reshape(times.size, *flow.values.shape[1:])
+    values = _added(_at_times(flow, times), error)
     known = flow.extent._replace(max_speed=float(np.hypot(values[..., 0], values[..., 1]).max()) * ROUNDED_UP)
     if times.size == 1:
         values = np.repeat(values, flow.times.size, axis=0)
@@ -259,15 +287,15 @@ def _ocean_with_error(flow: kernel.OceanGrid, field: OnMesh, times: Array) -> ke
     )
 
 
-def _at_times(flow: kernel.OceanGrid, times: Array) -> Array:
-    """Return the values (times, levels, ni, nj, 2) of an ocean grid, linear between its times [s]."""
+def _at_times(flow: kernel.OceanGrid | kernel.RisingOceanGrid, times: Array) -> Array:
+    """Return the values (times, levels, ni, nj, 2 or 4) of an ocean grid, linear between its times [s]."""
     at = np.clip(times, flow.times[0], flow.times[-1])
     below = np.clip(np.searchsorted(flow.times, at, side="right") - 1, 0, flow.times.size - 2)
     share = ((at - flow.times[below]) / np.diff(flow.times)[below])[:, None, None, None, None]
     return np.asarray((1 - share) * flow.values[below] + share * flow.values[below + 1])
 
 
-def _grid_places(flow: kernel.OceanGrid) -> tuple[Array, Array]:
+def _grid_places(flow: kernel.OceanGrid | kernel.RisingOceanGrid) -> tuple[Array, Array]:
     """Return the places x, y (ni, nj) [m] of an ocean grid's points.
 
     The grid's map gives the indices of a place; a cubic that is fitted to it gives the place of the indices. An

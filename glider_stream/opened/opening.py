@@ -12,7 +12,7 @@ from ..roadmap.roadmap import Roadmap
 from ..roadmap.slices import SlicedRoadmap
 from ..roadmap.store import KeptRoadmap, opened_roadmap
 from ..scenario import Scenario, read_scenario, scenario_from_text, shipped_scenarios
-from ..search.path import Path
+from ..search.path import Path, load_path
 from .questions import OpenedRoadmap, OpenedScenario
 from .searches import Nodes, Searches
 
@@ -79,12 +79,17 @@ def open_scenario(scenario: str | File | Scenario, overrides: Sequence[str] = ()
     return OpenedScenario(Searches(read_scenario(scenario, overrides)), File(scenario).stem)
 
 
+def is_plan(source: object) -> bool:
+    """Return whether a source is the name of a path file (.json)."""
+    return isinstance(source, str | File) and File(source).suffix.lower() == ".json"
+
+
 def open_either(
     source: "str | File | Roadmap | SlicedRoadmap | Scenario | OpenedScenario", overrides: Sequence[str] = ()
 ) -> OpenedScenario:
-    """Open a roadmap or a scenario: an object, a file (a scenario's ends in .toml), or a shipped name.
+    """Open a roadmap, a scenario or what a plan was made with: an object, a file, or a shipped name.
 
-    `overrides`: see `open` and `open_scenario`.
+    A scenario's file ends in .toml, a plan's in .json. `overrides`: see `open`, `open_scenario`, `open_plan`.
     """
     if isinstance(source, OpenedRoadmap):
         return open(source, overrides)
@@ -95,6 +100,8 @@ def open_either(
         return open_scenario(source, overrides)
     if isinstance(source, Roadmap | SlicedRoadmap):
         return open(source, overrides)
+    if is_plan(source):
+        return open_plan(load_path(source), overrides)
     if File(source).suffix == ".toml" or str(source) in shipped_scenarios():
         return open_scenario(source, overrides)
     return open(source, overrides)

@@ -12,7 +12,7 @@ from ..pilot.route_files import read_drawn
 from ..pilot.score import Score
 from ..pilot.score import score as score_of
 from ..search.departures import Moment
-from ..search.path import Path
+from ..search.path import Path, check_frame
 from ..search.surfacing import Surfacing
 from ..water.domain import GeographicDomain, Point
 from .searches import Searches
@@ -31,6 +31,7 @@ def scored(
     points = [] if start is None else [searches.point(start)]
     for file, drawing in zip(files, drawn, strict=True):
         require(on_globe or not drawing.geographic, f"the route {file} is in longitude and latitude, {cure}")
+        check_frame(drawing.scenario, searches.problem, f"the route {file}")
         points += [domain.point(place) if drawing.geographic else np.array(place) for place in drawing.places]
     require(len(points) > 1, f"the route {files[0]} holds one point; give the vehicle's position with --start")
     for n, point in enumerate(points, 1 if start is None else 0):

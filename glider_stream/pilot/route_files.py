@@ -24,11 +24,12 @@ BROKEN = ValueError, TypeError, LookupError, AttributeError, ArithmeticError, Re
 
 
 class Found(NamedTuple):
-    """The contents of a file: points, whether they are lon, lat, depth, and notes for the reader."""
+    """The contents of a file: points, whether they are lon, lat, depth, notes for the reader, its scenario."""
 
     points: list[Any]
     geographic: bool
     notes: list[str]
+    scenario: str = ""
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Drawn:
     notes: tuple[str, ...] = ()
     of_vehicle: bool = False
     """Whether it is a vehicle's file; the vehicle starts anywhere, so the way to the first point is unknown."""
+    scenario: str = ""
+    """The scenario of a path file of our own, as TOML, from whose centre its metres count; empty if unknown."""
 
 
 def read_drawn(file: str | Path) -> Drawn:
@@ -64,7 +67,7 @@ def read_drawn(file: str | Path) -> Drawn:
             content = stream.read(MOST_TEXT + 1)
         most = f"more than the {MOST_TEXT:,} bytes that a route needs"
         require(len(content) <= MOST_TEXT, f"the route {path} holds {most}; simplify it")
-        points, geographic, notes = FORMS[form](content.decode("utf-8-sig"))
+        points, geographic, notes, scenario = FORMS[form](content.decode("utf-8-sig"))
     except NotARoute as error:
         raise InputError(f"{path.name} cannot be read as a route: {error}") from None
     except InputError:
@@ -82,7 +85,7 @@ def read_drawn(file: str | Path) -> Drawn:
     count = f"from {least} to {MOST_POINTS:,} points; got {len(points)}"
     require(least <= len(points) <= MOST_POINTS, f"{path.name} must hold {count}")
     places = tuple(_place(point, n, path.name) for n, point in enumerate(points, 1))
-    return Drawn(places, geographic, tuple(notes), form in VEHICLES)
+    return Drawn(places, geographic, tuple(notes), form in VEHICLES, scenario)
 
 
 def _place(point: Any, number: int, name: str) -> Place:
@@ -104,7 +107,8 @@ def _json(text: str) -> Found:
     if isinstance(table.get("legs"), list):  # a path file of our own, in metres
         if not table["legs"]:
             raise NotARoute("it holds no leg; give a file in which a path was found")
-        return Found([table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False, [])
+        scenario = str(table.get("origin", {}).get("scenario", ""))
+        return Found([table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False, [], scenario)
     features = table["features"] if table["type"] == "FeatureCollection" else [table]
     lines: list[tuple[list[Any], dict[str, Any]]] = []
     points: list[tuple[list[Any], dict[str, Any]]] = []

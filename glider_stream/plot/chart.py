@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 DEEP = 2.5
 """A seabed deeper than this many times the route's depth is not drawn, since the route would look too small."""
 TIME_MAP = "plasma"
+TURNS = (5, 15, 30, 45, 90, 180, 360)
+"""The allowed distances of two angles on an axis [degrees], so that 0 is among them."""
 THROUGH, OVER, CURRENT = "#0072b2", INK, "#d55e00"
 
 
@@ -151,6 +153,7 @@ def _draw_depth(ax: "Axes", terrain: Terrain, rows: Array, clock: _Clock) -> Non
 
 def _draw_heading(ax: "Axes", steps: Along, clock: _Clock) -> None:
     from matplotlib.lines import Line2D
+    from matplotlib.ticker import MultipleLocator
 
     # a heading that passes north must not jump across the panel
     first = np.flatnonzero(np.diff(steps.leg, prepend=-1))
@@ -164,7 +167,8 @@ def _draw_heading(ax: "Axes", steps: Along, clock: _Clock) -> None:
     low, high = float(min(heading.min(), course.min())), float(max(heading.max(), course.max()))
     pad = max(10.0, 0.08 * (high - low))
     ax.set(ylim=(low - pad, high + pad), ylabel="Clockwise from north (°)")
-    ax.locator_params(axis="y", nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10])
+    turn = next((turn for turn in TURNS if 6 * turn >= high - low), TURNS[-1])
+    ax.yaxis.set_major_locator(MultipleLocator(turn))
     ax.yaxis.set_major_formatter(lambda angle, _: f"{angle % 360:g}")
     ax.grid(axis="y", color="#e6e6e6", linewidth=0.6)
     ax.set_title("(c) Heading through water, course over ground")

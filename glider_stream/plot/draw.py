@@ -12,7 +12,7 @@ from ..base.settings import require
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
 from ..roadmap.store import StoredRoadmap
-from ..search.path import Path, placed
+from ..search.path import Path, check_frame, placed
 from ..water.inspect import is_steady
 from .canvas import EARLIEST, check_figure, save_figure
 from .chart import plot_chart
@@ -47,6 +47,7 @@ def check_drawing(
 
 def check_water(problem: Problem, route: Path, name: str) -> None:
     """Raise InputError if a leg of a route begins or ends outside the problem's water."""
+    check_frame("" if route.origin is None else route.origin.scenario, problem, name)
     stops = np.array([point for leg in route.legs for point in (leg.start, leg.end)]).reshape(-1, 3)
     here = bool(problem.evaluator.allowed(stops, problem.departure).all())
     require(here, f"{name} leaves the roadmap's water; draw it over the roadmap that it was found in")

@@ -1,8 +1,8 @@
 """An old list of trims, flown on from a position fix: where it leads, and until when it is good.
 
 A vehicle that gets no new list flies on with the old one. Each glide ends at the depth of its end in the plan,
-since a vehicle turns by its depth; so the time of a glide does not depend on the current, but the place where it
-ends does.
+since a vehicle turns by its depth; so the time of a glide does not depend on the current, unless the water rises,
+but the place where it ends does.
 """
 
 import math
@@ -15,10 +15,14 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
+from ..kernels.control import control_of
 from ..kernels.edges import Edge, Status
+from ..kernels.flow import rises
+from ..kernels.legs import fly_legs
+from ..kernels.steer import FLOWN
+from ..roadmap.evaluator import Evaluator
 from ..roadmap.problem import Problem
 from ..water.frame import true_north
-from ..water.inspect import require_level
 from .assembly import Assembly
 from .glides import Air, Glides
 from .path import SURFACE, Leg, Path
@@ -156,19 +160,19 @@ def flown_on(path: Path, since: float, place: Array, problem: Problem) -> FlownO
 
     The problem leaves at the fix. The clock runs. The vehicle keeps the compass bearings of the plan.
     """
-    require_level(problem.evaluator.flow, "the rest of a plan, flown on with its own trims,")
     assembly = Assembly(problem, frozen=False)
     first = next_leg(path, since)
     hops: list[tuple[Array, Array, Edge]] = []
     stops, clock, here, why = [Stop(0, 0.0, place, 0.0)], 0.0, place, ""
     for number, leg in enumerate(path.legs[first:], first + 1):
-        through = leg.speed * math.sin(leg.glide_angle)
-        duration = (float(leg.end[2]) - float(here[2])) / through
+        heading, begins = leg.heading + _turned(leg, here, problem), assembly.begins(clock)
+        duration = _duration(leg, here, heading, begins, problem.evaluator)
         if duration <= 0:
             continue  # the vehicle is already at or beyond the depth where this glide ends
-        heading = leg.heading + _turned(leg, here, problem)
+        if duration == math.inf:
+            why = f"on leg {number} the water rises or sinks faster than the vehicle: it never turns"
+            break
         edge = _priced(_edge(leg, duration, heading), problem)
-        begins = assembly.begins(clock)
         why = _why_not_flown(here, edge, begins, problem, number)
         if why:
             break
@@ -183,6 +187,23 @@ def flown_on(path: Path, since: float, place: Array, problem: Problem) -> FlownO
     flown = assembly.path(place, here, hops)
     miss = math.dist(here[:2], path.goal[:2])
     return FlownOn(flown, first + 1, miss, why, tuple(stops))
+
+
+def _duration(leg: Leg, here: Array, heading: float, begins: float, evaluator: Evaluator) -> float:
+    """Return how long [s] the vehicle glides until it is at the depth of a leg's end; inf if it never is.
+
+    0 or less if it is there already. In water that rises the glide is flown to know it.
+    """
+    flow, still = evaluator.flow, (float(leg.end[2]) - float(here[2])) / (leg.speed * math.sin(leg.glide_angle))
+    if still <= 0 or not rises(flow):
+        return still
+    through = control_of(leg.speed, leg.glide_angle, heading)
+    integration, end = evaluator.integration, np.empty((1, 3))
+    start, velocity = np.array([[*here, begins]]), np.array([[through.u, through.v, through.w]])
+    longest = FLOWN * integration.dt * integration.steps
+    height = np.array([float(leg.end[2])])
+    fly_legs(flow, start, velocity, np.array([still]), height, longest, integration.dt, end, 0, 1)
+    return float(end[0, 2]) if math.isfinite(end[0, 0]) else math.inf
 
 
 def _turned(leg: Leg, here: Array, problem: Problem) -> float:

@@ -69,6 +69,7 @@ class Air:
 
     evaluator: Evaluator
     steps: ClassVar[Array] = STEPS
+    most_steps: ClassVar[int] = MOST_STEPS
 
     def glide(self, begin: Array, end: Array, angle: Array, heading: Array, departs: float | Array) -> Glides:
         """Return the legs by Newton's method, from a guess of their controls (n,) [rad].
@@ -84,8 +85,8 @@ class Air:
         limited = np.zeros(len(angle), np.bool_)
         rows = np.empty((3, len(angle), 7))
         rows[:, :, :T], rows[:, :, Z_END] = begin, end[:, 2]
-        for _ in range(MOST_STEPS):
-            time = self._expected(begin, end, angle, flown)
+        for _ in range(self.most_steps):
+            time, before = self._expected(begin, end, angle, flown), left
             if np.ndim(departs) == 0:
                 left = departs + np.concatenate([[0.0], np.cumsum(time)[:-1]])
             rows[:, :, T], rows[:, :, ANGLE], rows[:, :, HEADING] = left, angle, heading
@@ -95,6 +96,7 @@ class Air:
             ends, flown = landings[..., :2], landings[0, :, 2]
             off = end[:, :2] - ends[0]
             miss = np.hypot(off[:, 0], off[:, 1])
+            least = self._least(least, left, before)
             waited = np.where((miss < 0.5 * least) | limited, 0, waited + 1)
             least = np.fmin(least, miss)
             lost = (waited >= PATIENCE) & ~(miss <= CLOSE)
@@ -205,6 +207,10 @@ class Air:
         """Return whether legs have taken the times that the departures of those after them count on."""
         return True
 
+    def _least(self, least: Array, left: Array | float, before: Array | float) -> Array:
+        """Return the least misses (n,) [m] so far of legs that leave now [s]; `before`: when they left before."""
+        return least
+
     def times(self, begin: Array, end: Array, angle: Array) -> Array:
         """Return the times (n,) [s] of legs with glide angles (n,) [rad]."""
         rise = end[:, 2] - begin[:, 2]
@@ -250,7 +256,12 @@ class Air:
 
 @dataclass(frozen=True)
 class RisingAir(Air):
-    """Computes legs as `Air` does, in a flow with a vertical part: the times of legs are known after they fly."""
+    """Computes legs as `Air` does, in a flow with a vertical part: the times of legs are known after they fly.
+
+    So the legs of a route change their departures from step to step, and need more of them.
+    """
+
+    most_steps = 4 * MOST_STEPS
 
     def _expected(self, begin: Array, end: Array, angle: Array, flown: Array | None) -> Array:
         guess = self.times(begin, end, angle)
@@ -258,6 +269,10 @@ class RisingAir(Air):
 
     def _settled(self, expected: Array, flown: Array) -> bool:
         return bool((np.abs(flown - expected) <= AGREED).all())
+
+    def _least(self, least: Array, left: Array | float, before: Array | float) -> Array:
+        # a leg that leaves at another time begins anew
+        return np.where(np.abs(np.subtract(left, before)) > AGREED, np.inf, least)
 
     def _time_slopes(self, begin: Array, end: Array, glides: Glides, by: tuple[Array, Array, Array]) -> Array:
         angle, heading, later = by

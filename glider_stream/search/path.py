@@ -17,7 +17,8 @@ from ..base.errors import InputError
 from ..base.settings import from_table, require
 from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
-from ..water.frame import true_north
+from ..water.domain import domain_from_table
+from ..water.frame import LocalFrame, true_north, wrapped
 
 if TYPE_CHECKING:
     from ..roadmap.problem import Problem
@@ -28,6 +29,8 @@ LARGEST = 1e12
 """A larger number [m, s] in a path file cannot be a place or time on Earth."""
 SURFACE = 10.0
 """A leg that ends at this depth [m] or above it counts as a leg to the surface."""
+SAME_CENTRE = 1e-7
+"""Metres of two plans count from one place if their frames' centres differ by less than this [degrees]."""
 FROZEN = "FROZEN: every leg meets the current of the departure, so these times and places do not hold"
 """Every output says this about a path whose clock does not run."""
 Hop = tuple[Array, Array, Edge]
@@ -432,6 +435,30 @@ def _numbers(table: dict[str, Any], key: str, where: str, *shape: int | None) ->
     fits = fits and float(np.abs(values).max()) <= LARGEST  # False for NaN, too
     require(fits, f"`{key}` of {where} must be finite numbers, {count} of them")
     return values
+
+
+def check_frame(scenario: str, problem: "Problem", name: str) -> None:
+    """Raise InputError if the metres of the plan `name` count from another place than the problem's.
+
+    `scenario` is the TOML text with which it was planned; if it is empty, nothing is checked.
+    """
+    if not scenario or problem.domain is None:
+        return
+    try:
+        table = tomllib.loads(scenario).get("domain", {})
+    except ValueError:
+        raise InputError(f"the scenario in `origin` of {name} is no TOML text; plan again") from None
+    theirs, mine = domain_from_table(table).frame(), problem.domain.frame()
+    same = theirs is None and mine is None
+    if theirs is not None and mine is not None:
+        apart = float(wrapped(theirs.lon - mine.lon, 0.0)), theirs.lat - mine.lat
+        same = max(map(abs, apart)) <= SAME_CENTRE
+    places = f"its metres count from {_centre(theirs)}, and here from {_centre(mine)}"
+    require(same, f"{name} was planned in another [domain]: {places}; give its own scenario, or plan again")
+
+
+def _centre(frame: LocalFrame | None) -> str:
+    return "x = 0, y = 0" if frame is None else f"longitude {frame.lon:.7g}, latitude {frame.lat:.7g}"
 
 
 def placed(path: Path, problem: "Problem") -> Path:

@@ -81,3 +81,12 @@ def test_interpolation_is_exact_for_what_is_linear_along_every_axis(axes):
         ends = values, tuple(np.uintp(c) for c in cell), tuple(weight)
         np.testing.assert_allclose(pair_between(*ends), exact, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(pair_between_compiled(*ends), exact, rtol=1e-12, atol=1e-12)
+
+
+def test_an_axis_without_a_weight_is_read_at_its_cell():
+    rng = np.random.default_rng(7)
+    values = rng.uniform(-1, 1, (3, 4, 5, 2))
+    cell, weight = tuple(map(np.uintp, (2, 1, 3))), (0.3, 0.6)
+    exact = pair_between(values[2], cell[1:], weight)
+    assert pair_between(values, cell, weight) == exact
+    np.testing.assert_allclose(pair_between_compiled(values, cell, weight), exact, rtol=1e-14)

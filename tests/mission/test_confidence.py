@@ -183,6 +183,7 @@ def test_the_command_chooses_and_looks_at_a_route(folder, capsys, monkeypatch):
         (["--draws", "2", "--best", "mean", "--by", "1"], "leave one out"),
         (["--draws", "9", "--best", "100%"], "must be between 0 % and 100 %; got 100%"),
         (["--draws", "2", "--best", "mean", "-o", "route.txt"], "route.txt"),
+        (["--draws", "2", "--best", "mean", "-o", "route.kml"], "route.kml needs longitude and latitude"),
     ],
 )
 def test_what_is_wrong_is_refused(folder, capsys, monkeypatch, arguments, sentence):
@@ -268,6 +269,9 @@ def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
     assert made.forecast.evaluator.flow.values == pytest.approx(1.5 * one, abs=1e-6)
     with pytest.raises(InputError, match=r"a\.nc holds no members: name a file that does, or one file for each"):
         from_files(read_mission("ionian", first_member([tmp_path / "a.nc"])), [tmp_path / "a.nc"])
+    low = read_mission("ionian", [*first_member([tmp_path / "both.nc"]), "query.start=[18.3, 38.1, 50.0]"])
+    with pytest.raises(InputError, match="begins and ends at the surface; got a start at a depth of 50 m"):
+        from_files(low, [tmp_path / "both.nc"])
     doubled.isel(depth=[0, 1, 3, 4]).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
     files = [tmp_path / "a.nc", tmp_path / "less.nc"]
     read = read_mission("ionian", first_member(files))

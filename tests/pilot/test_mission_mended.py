@@ -17,7 +17,7 @@ from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import scenario_from_text
 from glider_stream.search.flown_on import check_smooth
 from glider_stream.search.path import load_path
-from glider_stream.water.mapping.dive_files import read_dives
+from glider_stream.water.mapping.observation_files import read_dives
 
 
 @pytest.fixture(scope="module")

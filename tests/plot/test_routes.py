@@ -52,7 +52,7 @@ def test_the_command_draws_several_files(two, tmp_path, capsys):
     refused = command(capsys, "plot", road, *files, "-o", drawn, "--chart")
     assert refused.code == 2
     assert "several routes need one --depth" in refused.err
-    refused = command(capsys, "plot", road, files[0], files[0], "-o", drawn)
+    refused = command(capsys, "plot", files[0], files[0], "-o", drawn)
     assert refused.code == 2
     assert "each path needs a different name" in refused.err
 

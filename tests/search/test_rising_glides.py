@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from helpers.reference import replay_rising
 
 from glider_stream.kernels.motion import traced
 from glider_stream.kernels.place import Place, Velocity
 from glider_stream.search.glides import Air, RisingAir, air_of
-from glider_stream.water.analytic import Upwelling
+from glider_stream.water.analytic import InternalWave, Upwelling
 
 STOPS = np.array([[0.0, 0.0, -20.0], [200.0, 260.0, -200.0], [380.0, 340.0, -50.0]])
 GUESS = np.array([0.6, 0.5]), np.array([0.7, 0.1])
@@ -42,6 +43,22 @@ def test_slopes_are_those_of_legs_beside(air):
         for name in ("time", "angle", "heading"):
             by = getattr(around[0], name) - getattr(around[1], name)
             assert getattr(slopes, name)[:, column] == pytest.approx(by, rel=1e-3, abs=1e-5)
+
+
+def test_in_a_wave_each_leg_waits_for_those_before_it(evaluator):
+    wave = InternalWave(w=0.15, length=400.0, depth=150.0, period=900.0).kernel((-150.0, 0.0))
+    air = air_of(evaluator(wave))
+    # so near that the last leg is there before the others settle when it leaves
+    stops = np.array([[-290, 0, 0], [-1200 / 7, 0, -75], [-600 / 7, 0, 0], [600 / 7, 80, -150], [290, 50, 0]])
+    guess = np.array([0.56359, 0.77498, 0.64348, 0.60327]), np.array([0.0, -2e-5, 0.45263, -0.15388])
+    legs = air.glide(stops[:-1], stops[1:], *guess, 0.0)
+    assert legs.exact.all()
+    assert legs.departs == pytest.approx(np.concatenate([[0.0], np.cumsum(legs.time)[:-1]]), abs=1e-6)
+    through = air.through(legs.angle, legs.heading, np.diff(stops[:, 2]) > 0)
+    for n in range(4):
+        *end, duration = replay_rising(wave, (*stops[n], legs.departs[n]), through[n], stops[n + 1, 2], 900.0)
+        assert np.linalg.norm(end - stops[n + 1]) < 1e-3
+        assert duration == pytest.approx(legs.time[n], abs=1e-3)
 
 
 def test_water_that_does_not_rise_has_its_own_legs(evaluator, vortices):

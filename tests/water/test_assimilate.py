@@ -11,9 +11,9 @@ from helpers.small import command, strict_json
 from glider_stream.base.errors import InputError
 from glider_stream.water.frame import LocalFrame
 from glider_stream.water.mapping.assimilate import assimilate
-from glider_stream.water.mapping.dive_files import read_dives
 from glider_stream.water.mapping.mapped import map_currents
 from glider_stream.water.mapping.measured import Dives, Drifters, Points
+from glider_stream.water.mapping.observation_files import read_dives
 from glider_stream.water.ocean import Names, OceanFlow, read_currents
 from glider_stream.water.ocean.writing import write_currents
 

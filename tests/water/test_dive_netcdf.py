@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from glider_stream.base.errors import InputError
-from glider_stream.water.mapping.dive_files import read_dives
+from glider_stream.water.mapping.observation_files import read_dives
 
 NOON = 1_732_104_000.0  # 2024-11-20T12:00Z
 

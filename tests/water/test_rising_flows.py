@@ -2,18 +2,16 @@
 
 import json
 import math
-import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.missions import MISSION
-from helpers.small import SCENARIO
 
 from glider_stream.base.errors import InputError
 from glider_stream.evaluation.baselines import straight
 from glider_stream.evaluation.level_set import bound
 from glider_stream.kernels.flow import (
+    Grid,
     Rising,
     RisingGrid,
     RisingOceanGrid,
@@ -23,14 +21,11 @@ from glider_stream.kernels.flow import (
     rises,
     velocity,
 )
-from glider_stream.mission.settings import mission_from_table
-from glider_stream.mission.world import Worlds
 from glider_stream.scenario import read_scenario
-from glider_stream.search.flown_on import flown_on
 from glider_stream.search.path import Leg, Path, load_path
 from glider_stream.water.analytic import Abc, InternalWave, Rolls, Uniform, Upwelling
 from glider_stream.water.inspect import is_steady, require_level
-from glider_stream.water.sampled import sample_flow, sampling_error
+from glider_stream.water.sampled import level_part, sample_flow, sampling_error
 
 DEPTHS = (-300.0, 0.0)
 SIDES = (-500.0, 500.0)
@@ -94,6 +89,18 @@ def test_a_flow_without_one_has_no_vertical_part():
     assert current(flow, 1.0, 2.0, -3.0, 4.0) == (0.3, -0.2, 0.0)
 
 
+def test_a_grid_without_its_vertical_part_has_the_same_u_and_v():
+    box = (-400.0, 400.0)
+    grid = sample_flow(FLOWS["cells"].kernel(DEPTHS), (40.0, 40.0, 30.0), box, box, DEPTHS)
+    level = level_part(grid)
+    assert type(level) is Grid
+    for x, y, z, _ in np.clip(scattered(40), -380.0, 380.0):
+        assert velocity(level, x, y, min(z, 0.0), 0.0) == velocity(grid, x, y, min(z, 0.0), 0.0)
+    assert level.level_carry[-1] == pytest.approx(0.1 * 300.0, rel=0.5)
+    assert level_part(level) is level
+    assert level_part(FLOWS["cells"].kernel(DEPTHS)) is None
+
+
 def test_a_grid_holds_the_vertical_part_too():
     flow = FLOWS["upwelling"].kernel(DEPTHS)
     grid = sample_flow(flow, (100.0, 100.0, 50.0), SIDES, SIDES, DEPTHS)
@@ -139,17 +146,10 @@ def test_a_scenario_says_that_its_water_rises_and_what_the_line_foresees(problem
     assert "foresee" not in exact.flow_words
 
 
-@pytest.mark.parametrize("what", ["mission", "baseline", "rest of a plan", "2 dimensions"])
-def test_what_takes_no_vertical_current_refuses_it(problem, tmp_path, what):
-    (tmp_path / "small.toml").write_text(SCENARIO)
-    table = tomllib.loads(MISSION)
-    table["scenario"]["set"] += [*CELLS]
-    leg = Leg(problem.start, problem.goal, -0.5, 0.0, 1.0, 0.0, 100.0, 0.0, np.zeros((2, 4)))
-    path = Path(problem.start, problem.goal, 100.0, (leg,))
+@pytest.mark.parametrize("what", ["baseline", "2 dimensions"])
+def test_what_takes_no_vertical_current_refuses_it(problem, what):
     asked = {
-        "mission": lambda: Worlds(mission_from_table(table, tmp_path / "mission.toml")),
         "baseline": lambda: straight(problem, problem.start, problem.goal),
-        "rest of a plan": lambda: flown_on(path, 0.0, problem.start, problem),
         "2 dimensions": lambda: bound(problem, 2),
     }
     with pytest.raises(InputError, match="vertical current, and this flow has one"):

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import Flow, OceanGrid
+from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid
 from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
@@ -17,7 +17,7 @@ from ...water.ocean import OceanFlow
 from ...water.ocean.ensemble import member_labels
 from ..orders import is_up
 from ..settings import Mission
-from ..world import Worlds
+from ..world import Worlds, check_ends, check_known
 
 MOST_MEMBERS = 10_000
 KEPT = 64
@@ -91,12 +91,11 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     """
     scenarios = _scenarios(mission.scenario, files)
     problems = [_timed(scenario.problem()) for scenario in scenarios]
+    for problem in problems:
+        check_known(problem, mission, "members' current")
+    check_ends(problems[0])
     mean = _mean([problem.evaluator.flow for problem in problems])
     forecast = replace(problems[0], evaluator=replace(problems[0].evaluator, flow=mean))
-    until = forecast.departure + mission.arrival.longest
-    known = forecast.evaluator.flow.extent
-    why = f"`arrival.longest_hours` = {mission.arrival.longest_hours:g} reaches beyond the times of the members"
-    require(until <= known.t_hi, f"{why}, which end {(known.t_hi - forecast.departure) / 3600:.3g} h later")
     names = ", ".join(Path(file).name for file in files[:3]) + (", ..." if len(files) > 3 else "")
     numbers = tuple(range(len(problems)))
     return Ensemble(
@@ -108,9 +107,9 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     )
 
 
-def _mean(flows: Sequence[Flow]) -> OceanGrid:
+def _mean(flows: Sequence[Flow]) -> OceanGrid | RisingOceanGrid:
     """Return the mean of currents on one grid; InputError if their points or times differ."""
-    grids = [flow for flow in flows if isinstance(flow, OceanGrid)]
+    grids = [flow for flow in flows if isinstance(flow, OceanGrid | RisingOceanGrid)]
     first, total = grids[0], np.zeros_like(grids[0].values)
     for n, grid in enumerate(grids):
         alike = grid.values.shape == first.values.shape and np.array_equal(grid.times, first.times)

@@ -334,7 +334,7 @@ class Component:
     def _check_room(self, sizes: tuple[int, int, int, int], room: float) -> None:
         # the planner holds float64; the other component takes the same room
         need = 8.0 * math.prod(sizes)
-        if (need if self.component == "v" else 2 * need) > room:
+        if (2 * need if self.component == "u" else need) > room:
             raise TooLargeError(
                 f"the currents of {self.file} would take {2 * need / 1e9:.1f} GB "
                 f"({' x '.join(map(str, sizes))} points), more than the rest of the limit, {room / 1e9:.1f} GB: "
@@ -447,7 +447,8 @@ class Component:
             notes += (
                 f"`{self.name}` has no unit: taken as m/s, the unit that its makers use; at most {fastest:.2f}",
             )
-        return notes + speed_doubts(self.variable, fastest)
+        # a vertical current is slower than any sea's horizontal one
+        return notes if self.component == "w" else notes + speed_doubts(self.variable, fastest)
 
     def _check_nominal(self, lon: Any, lat: Any, axis: Array) -> None:
         """Raise InputError if a tripolar model's axes are used beyond the latitude where its grid bends."""

@@ -35,7 +35,7 @@ def _same(a: NDArray[Any] | None, b: NDArray[Any] | None) -> bool:
     return bool(np.allclose(a, b, rtol=0, atol=1e-3 * float(np.diff(a).min(initial=1.0))))
 
 
-def _stacked(name: str, parts: list[Part]) -> Part:
+def stacked(name: str, parts: list[Part]) -> Part:
     """Return the parts of one component joined in time."""
     first = parts[0]
     for part in parts[1:]:
@@ -70,13 +70,13 @@ def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
     for component, toward in (("u", "east"), ("v", "north")):
         matching = [part for part in parts if part.component == component]
         require(len(matching) > 0, f"{name} holds no current toward {toward}; also name the file that does")
-        both.append(_stacked(name, matching))
+        both.append(stacked(name, matching))
     east, north = both
     require(
         _same(east.times, north.times),
         f"{name}: east and north currents are given at different times; give both at the same times",
     )
-    moments = _stamped(name, east.times, names)
+    moments = stamped(name, east.times, names)
     levels = _levels_of_both(name, east, north)
     notes = list(dict.fromkeys(note for part in both for note in part.notes))
     grid, u, v, deeper, more = _together(name, east, north, names)
@@ -167,7 +167,7 @@ def _assumed(
     }
 
 
-def _stamped(name: str, times: Times | None, names: Names) -> Times | None:
+def stamped(name: str, times: Times | None, names: Names) -> Times | None:
     """Return the times, moved to the middle of their intervals if the user sets `stamps`.
 
     InputError if a time repeats.

@@ -38,7 +38,7 @@ SHORT_NAMES = [
     ("eastward_eulerian_current_velocity", "northward_eulerian_current_velocity"),
 ]
 IN_METRES = {"uo", "vo", "uos", "vos", "utotal", "vtotal", "water_u", "water_v", "ugos", "vgos"}
-IN_METRES |= {"vozocrtx", "vomecrty", "u_eastward", "v_northward"}
+IN_METRES |= {"vozocrtx", "vomecrty", "u_eastward", "v_northward", "wo", "vovecrtz"}
 """Variables with these names are in m/s even if the file gives no unit."""
 LONG_NAMES = [
     (
@@ -86,9 +86,14 @@ AXIS_NAMES["lat"] |= {"gphit", "gphiu", "gphiv", "gphif", "geolat", "geolat_c", 
 AXIS_NAMES["lat"] |= {"geolat_v", "ulat", "tlat", "yc", "yg", "yu_ocean", "yt_ocean", "yh", "yq"}
 AT_U = re.compile(r"(_u|lamu|phiu|^ul(on|at|ong))$|^ul(on|at|ong)$|^xu_|^yu_|_c$|_q$", re.IGNORECASE)
 AT_V = re.compile(r"(_v|lamv|phiv)$|^ul(on|at|ong)$|^xu_|^yu_|_c$|_q$", re.IGNORECASE)
-"""Coordinates of the points of u and v, in files that also hold other points."""
+AT_W = re.compile(r"(_w|_t|_rho|lamt|phit)$|^tl(on|at|ong)$|^xt_|^yt_|_h$", re.IGNORECASE)
+"""Coordinates of the points of u, of v and of w, in files that also hold other points."""
 ELSEWHERE = re.compile(r"(lam[ft]|phi[ft]|_psi|_t|_rho|^tl(on|at|ong))$", re.IGNORECASE)
 """Coordinates of the points of tracers and of the cells' corners."""
+NOT_AT_W = re.compile(r"(lam[fuv]|phi[fuv]|_psi|_[uvcq])$|^ul(on|at|ong)$|^xu_|^yu_", re.IGNORECASE)
+"""Coordinates of points between which w lies."""
+OF = {"u": (AT_U, ELSEWHERE), "v": (AT_V, ELSEWHERE), "w": (AT_W, NOT_AT_W)}
+"""Coordinates that fit a component, and coordinates that do not."""
 OTHERS = re.compile(r"^(tl(on|at|ong)|glam[ft]|gphi[ft]|geo(lon|lat)_t|(lon|lat)_psi)$", re.IGNORECASE)
 """Coordinates without currents, unless the variable's `coordinates` attribute names them."""
 UNFIT_FOR_DEGREES = ("m", "km", "meters", "metres", "meter", "metre", "1")
@@ -226,7 +231,7 @@ class Catalogue:
 
         Return a note if only its long name is of the other component: such texts are often copied by mistake.
         """
-        if getattr(self.names, component) == name:
+        if component == "w" or getattr(self.names, component) == name:
             return ()
         variable = self.data[name]
         texts = {"standard name": standard_name(variable), "name": name.lower()}
@@ -366,6 +371,7 @@ class Catalogue:
         """Return the names of the two-dimensional longitude and latitude of a variable's points, or None."""
         dims = set(map(str, variable.dims))
         found = {}
+        here_of, elsewhere_of = OF[component]
         for kind in ("lon", "lat"):
             wanted = getattr(self.names, kind)
             every = [
@@ -377,15 +383,16 @@ class Catalogue:
             ]
             if wanted is not None and wanted in every:
                 every = [wanted]
-            every = [name for name in every if not ELSEWHERE.search(name)] or every
+            every = [name for name in every if not elsewhere_of.search(name)] or every
             listed = [name for name in every if name in self.coordinates(variable)]
-            matching = [name for name in every if (AT_U if component == "u" else AT_V).search(name)]
+            matching = [name for name in every if here_of.search(name)]
             hits = listed if len(listed) == 1 else matching if len(matching) == 1 else every
-            elsewhere = [name for name in hits if wanted != name and name not in listed and OTHERS.match(name)]
+            wrong = elsewhere_of if component == "w" else OTHERS
+            elsewhere = [name for name in hits if wanted != name and name not in listed and wrong.search(name)]
             require(
                 not elsewhere,
-                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, which are cells' "
-                "centres or corners: add the file with the positions of its points, or set `lon` and `lat` in "
+                f"`{variable.name}` in {self.name} does not lie at `{', '.join(elsewhere)}`, which are other "
+                "points of the cells: add the file with the positions of its points, or set `lon` and `lat` in "
                 "`names`",
             )
             require(

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...base.checks import Range
-from ...base.errors import InputError
 from ...base.settings import from_table, require
 from .component import Component, Domain
 from .file import OceanFile, parse_time
@@ -19,7 +18,6 @@ from .joining import joined
 from .names import Catalogue, Names, listing, standard_name
 from .opening import opened
 from .part import Part
-from .vertical import CONTINUITY
 
 LIMIT = 2e9
 """The currents of a domain may take at most this much memory [bytes]; a point takes two float64."""
@@ -55,9 +53,9 @@ def read_currents(
         for path in paths:
             with opened(path, given.group) as data:
                 room = limit - sum(8.0 * part.values.size for part in parts)
-                whole = _with(data, beside)
+                whole = with_fields_of(data, beside)
                 found = _parts(Catalogue(path.name, whole, given), domain, room, depth is None)
-                parts += [_dated(_grounded(part, beside, given), parts, given) for part in found]
+                parts += [dated(_grounded(part, beside, given), parts, given) for part in found]
     return joined(paths, parts, given)
 
 
@@ -65,33 +63,6 @@ VERTICAL_WORDS = re.compile(r"\b(upward|vertical).*(velocity|current|speed)|\bw.
 NO_WATER = re.compile(r"\bair\b|wind|\bice\b")
 VERTICAL_NAMES = {"w", "wo", "vovecrtz", "wvel"}
 """How a vertical current is told: by its long name, unless it is of air or ice, or by its name."""
-
-
-def vertical_of(files: Sequence[str], names: Names, name: str, upward: bool | None) -> float:
-    """Return 1 if the variable of a vertical current counts upward, -1 if downward.
-
-    InputError if no file holds it, or if neither the file nor the user says which.
-    """
-    held: list[str] = []
-    for path in map(Path, files):
-        with opened(path, names.group) as data:
-            held += map(str, data.variables)
-            if name not in data.variables:
-                continue
-            words = f"{standard_name(data[name])} {data[name].attrs.get('long_name', '')}".lower()
-            ways = [way for way, word in ((1.0, "upward"), (-1.0, "downward")) if word in words]
-            way = ways[0] if upward is None and len(ways) == 1 else None
-            if upward is not None:
-                way = 1.0 if upward else -1.0
-            if way is None:
-                raise InputError(
-                    f"`{name}` of {path.name} does not say whether it counts upward; set `flow.upward`"
-                )
-            return way
-    raise InputError(
-        f"`flow.vertical` names a variable of the files, and none holds `{name}`; name another, "
-        f'or "{CONTINUITY}"; they hold: {listing(held)}'
-    )
 
 
 def _vertical_note(at: Catalogue) -> tuple[str, ...]:
@@ -163,7 +134,7 @@ def _grounded(part: Part, beside: list[Any], names: Names) -> Part:
     return part
 
 
-def _dated(part: Part, before: list[Part], names: Names) -> Part:
+def dated(part: Part, before: list[Part], names: Names) -> Part:
     """Return the part with the time that the user gives: `origin`, plus `step` for each earlier file."""
     if names.step is None:
         return part
@@ -179,7 +150,7 @@ def _dated(part: Part, before: list[Part], names: Names) -> Part:
     return replace(part, times=np.array([first + after]), took=took)
 
 
-def _with(data: Any, beside: list[Any]) -> Any:
+def with_fields_of(data: Any, beside: list[Any]) -> Any:
     """Return a dataset with the variables of other files that fit its dimensions, such as a model's grid."""
     for other in beside:
         fits = {

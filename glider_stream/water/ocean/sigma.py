@@ -17,6 +17,8 @@ FINER = 2
 """There are this many levels of fixed depth for each terrain-following one, so that interpolation does not blur.
 """
 SAME = 1e-6
+STRETCHES = ("Cs_r", "Cs_rho"), ("Cs_w",)
+"""Names of the stretching at the levels of u and v, and at the faces between them, where w lies."""
 THIN = 0.1
 """A single level this near to the surface or the seabed, as a share of the depth, is the outermost layer."""
 
@@ -81,7 +83,7 @@ def _coordinate(data: Any, dim: str, variable: Any) -> Any | None:
     for name in map(str, data.variables):
         if data[name].dims == (dim,) and SIGMA.match(standard_name(data[name])):
             return data[name]
-    return data[dim] if dim in data.variables else _among_attributes(data, dim, variable, "sc_r")
+    return data[dim] if dim in data.variables else _among_attributes(data, dim, variable, "sc_r", "sc_w")
 
 
 def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
@@ -135,8 +137,8 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
         transform in (None, float(standard[-1])),
         f"{subject} of the form {standard!r}, but the file says `Vtransform` = {transform}: mend one of them",
     )
-    stretch, critical = term("C", "Cs_r", "Cs_rho"), number("depth_c", "hc", "Tcline")
-    stretch = _among_attributes(data, dim, variable, "Cs_r") if stretch is None else stretch
+    stretch, critical = term("C", *STRETCHES[dim == "s_w"]), number("depth_c", "hc", "Tcline")
+    stretch = _among_attributes(data, dim, variable, "Cs_r", "Cs_w") if stretch is None else stretch
     lacks = [what for what, term_found in (("Cs_r", stretch), ("hc", critical)) if term_found is None]
     require(not lacks, f"{subject}, but the file holds no {listing(lacks)}; add the grid file that does")
     assert stretch is not None
@@ -157,14 +159,15 @@ def _with_range(description: str, low: tuple[float, float], high: tuple[float, f
     return description + kept
 
 
-def _among_attributes(data: Any, dim: str, variable: Any, name: str) -> Any | None:
+def _among_attributes(data: Any, dim: str, variable: Any, *names: str) -> Any | None:
     """Return values along the levels that CROCO writes as an attribute of the file, or None."""
     import xarray
 
-    values = np.ravel(data.attrs.get(name, []))
-    if values.size != variable.sizes[dim] or values.dtype.kind not in "fi":
-        return None
-    return xarray.DataArray(values.astype(np.float64), dims=(dim,), name=name)
+    for name in names:
+        values = np.ravel(data.attrs.get(name, []))
+        if values.size == variable.sizes[dim] and values.dtype.kind in "fi":
+            return xarray.DataArray(values.astype(np.float64), dims=(dim,), name=name)
+    return None
 
 
 def _ends(name: str, variable: Any, s: Array, c: Array) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -15,6 +15,8 @@ CONTINUITY = "continuity"
 """The word with which a user asks for it, in place of a variable's name."""
 APART = 0.2
 """Points of two grids are the same if they are no further apart than this share of a cell."""
+CLOSE = 0.05
+"""Levels of u and of w that are no further apart than this [m] are the same; tables of levels stay small."""
 FEWEST = 100
 """Columns that must end within the levels before their bottoms tell of an error."""
 
@@ -43,32 +45,57 @@ def by_continuity(
         f"{float(np.abs(w).max()):.2g} m/s; on half the points it differs by rms {rough:.2g} m/s"
         + _told_bottom(flow, place, seabed, w)
     )
-    return _with(flow, values, flow.levels), text
+    return with_rise(flow, values, flow.levels), text
 
 
-def by_variable(flow: OceanGrid, upward: OceanGrid, way: float, frame: LocalFrame, grids: tuple[Grid, Grid],
-                name: str) -> tuple[RisingOceanGrid, str]:  # fmt: skip
+def by_variable(
+    flow: OceanGrid, upward: tuple[OceanGrid, Seabed, Grid], way: float, frame: LocalFrame, grid: Grid, name: str
+) -> tuple[RisingOceanGrid, str]:
     """Return the flow with a file's own w, on the levels of both, and a text on it.
 
     `upward` holds w in place of east and north, turned as these are; `way` is -1 where it counts downward.
-    `grids` are those of the flow and of w. InputError unless both have the same points and times.
+    InputError unless w lies on the times and points of the currents, perhaps on more points.
     """
-    mine, its = (_places(frame, grid) for grid in grids)
-    same = mine.shape == its.shape and np.array_equal(flow.times, upward.times)
-    require(same, f"`flow.vertical` = {name!r} lies on other points or times than the currents; {_CURE}")
-    cell = float(np.linalg.norm(np.diff(mine, axis=0), axis=-1).max())
-    far = float(np.linalg.norm(mine - its, axis=-1).max())
-    require(far <= APART * cell, f"`flow.vertical` = {name!r} lies {far:,.0f} m beside the currents; {_CURE}")
-    lon, lat = (part.T for part in grids[1].mesh())
+    lifted, data, its_grid = upward
+    require(
+        np.array_equal(flow.times, lifted.times),
+        f"`flow.vertical` = {name!r} is given at other times than the currents; {_CURE}",
+    )
+    part = _same_points(_places(frame, grid), _places(frame, its_grid), name)
+    lon, lat = (axis.T for axis in its_grid.mesh())
     turn = frame.convergence(lon, lat)
-    w = way * (upward.values[..., 0] * np.cos(turn) + upward.values[..., 1] * np.sin(turn))
-    levels = np.union1d(flow.levels, upward.levels)
-    across, up = on_levels(flow.values, flow.levels, levels), on_levels(w[..., None], upward.levels, levels)
+    w = way * (lifted.values[..., 0] * np.cos(turn) + lifted.values[..., 1] * np.sin(turn))[:, :, *part]
+    levels = _both(flow.levels, lifted.levels)
+    across, up = on_levels(flow.values, flow.levels, levels), on_levels(w[..., None], lifted.levels, levels)
     values = np.concatenate([across, up, np.zeros_like(up)], axis=-1)
-    return _with(flow, values, levels), f"vertical current `{name}`, at most {float(np.abs(w).max()):.2g} m/s"
+    told = f"vertical current `{name}`, at most {float(np.abs(w).max()):.2g} m/s"
+    lacks = int((data.bottom[part] >= 0.0).sum())
+    told += f"; {lacks} of {w[0, 0].size} columns hold none, and take their neighbours'" if lacks else ""
+    return with_rise(flow, values, levels), told
 
 
 _CURE = f'bring them onto one grid first, or choose "{CONTINUITY}"'
+
+
+def _same_points(mine: Array, its: Array, name: str) -> tuple[slice, slice]:
+    """Return where the points (ni, nj, 2) [m] lie among others; InputError if they are not among them."""
+    first = np.linalg.norm(its - mine[0, 0], axis=-1)
+    i, j = np.unravel_index(int(first.argmin()), first.shape)
+    part = slice(int(i), int(i) + mine.shape[0]), slice(int(j), int(j) + mine.shape[1])
+    cell = min(float(np.linalg.norm(np.diff(mine, axis=axis), axis=-1).min()) for axis in (0, 1))
+    require(
+        its[part].shape == mine.shape,
+        f"`flow.vertical` = {name!r} lies on other points than the currents, or on fewer; {_CURE}",
+    )
+    far = float(np.linalg.norm(its[part] - mine, axis=-1).max())
+    require(far <= APART * cell, f"`flow.vertical` = {name!r} lies {far:,.0f} m beside the currents; {_CURE}")
+    return part
+
+
+def _both(mine: Array, its: Array) -> Array:
+    """Return rising levels [m] with those of both; two that are nearly the same are one."""
+    off = np.abs(its[:, None] - mine).min(axis=1)
+    return np.union1d(mine, its[off > CLOSE])
 
 
 def on_levels(values: Array, levels: Array, at: Array) -> Array:
@@ -79,7 +106,7 @@ def on_levels(values: Array, levels: Array, at: Array) -> Array:
     return np.asarray((1 - share) * values[:, below] + share * values[:, below + 1])
 
 
-def _with(flow: OceanGrid, values: Array, levels: Array) -> RisingOceanGrid:
+def with_rise(flow: OceanGrid, values: Array, levels: Array) -> RisingOceanGrid:
     """Return a flow with a vertical part, of values (times, levels, ni, nj, 4) [m/s]."""
     level_slot, slots_per_z = slots(levels)
     new = {"values": np.ascontiguousarray(values), "levels": levels, "level_slot": level_slot}

@@ -9,7 +9,8 @@ from ..frame import LocalFrame
 from .bottom import Bottom
 from .flow import ocean_grounds
 from .names import Names
-from .reader import read_currents, vertical_of
+from .reader import read_currents
+from .upward import read_upward
 from .vertical import CONTINUITY, by_continuity, by_variable
 
 
@@ -58,11 +59,10 @@ class OceanFlow:
             result, told = by_continuity(flow, seabed, frame, grid, file.name)
             rising = [told]
         elif self.vertical is not None:
-            way = vertical_of(self.file, names, self.vertical, self.upward)
-            own = replace(names, u=self.vertical, v=self.vertical, rotate="none")
-            upward, _, points = ocean_grounds(read_currents(self.file, own, lon=lon, lat=lat, depth=depth), *box)
-            result, told = by_variable(flow, upward, way, frame, (grid, points), self.vertical)
-            rising = [told]
+            lifted = read_upward(self.file, names, self.vertical, self.upward, lon=lon, lat=lat, depth=depth)
+            own = ocean_grounds(lifted.file, *box)
+            result, told = by_variable(flow, own, lifted.way, frame, grid, self.vertical)
+            rising = [told, lifted.told]
         source = [
             f"{file.took['u']}, {file.took['v']} of {file.name}",
             file.time_range,
