@@ -40,6 +40,13 @@ def skipped(path: Path, radius: float) -> list[str]:
     return [f"{lie} {radius:g} m of the one before, or of the start, so a vehicle does not fly to them; {cure}"]
 
 
+def plain_number(text: str) -> float:
+    """Return the number in a vehicle's file; ValueError if only Python reads it as one, such as 1_8."""
+    if "_" in text:
+        raise ValueError(f"{text} is no number that a vehicle reads")
+    return float(text)
+
+
 def degrees_and_minutes(degrees: float) -> str:
     """Return degrees as DDDMM.mmmm, which vehicles read: 74 degrees 11.587 minutes west are -7411.5870.
 
@@ -52,7 +59,7 @@ def degrees_and_minutes(degrees: float) -> str:
 
 def from_degrees_and_minutes(text: str) -> float:
     """Return the degrees of a text DDDMM.mmmm; ValueError if it is not such a number."""
-    packed = float(text)
+    packed = plain_number(text)
     whole, minutes = divmod(abs(packed), 100)
     if not minutes < 60 or whole > 180:
         raise ValueError(f"{text} has {minutes:g} minutes or too many degrees")

@@ -13,11 +13,11 @@ from helpers.small import command
 
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Status
-from glider_stream.kernels.flow import velocities
+from glider_stream.kernels.flow import Extent, RisingOceanGrid, velocities
 from glider_stream.mission.assimilating import corrected
 from glider_stream.mission.confidence.answer import confidence_of
 from glider_stream.mission.confidence.candidates import Search
-from glider_stream.mission.confidence.ensemble import drawn, first_member, from_files
+from glider_stream.mission.confidence.ensemble import _mean, drawn, first_member, from_files
 from glider_stream.mission.confidence.judged import Criterion, Flights, best_of, checked, lost_leg, quantile
 from glider_stream.mission.confidence.reach import reach_of
 from glider_stream.mission.pilot import plan_of
@@ -275,5 +275,28 @@ def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
     doubled.isel(depth=[0, 1, 3, 4]).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
     files = [tmp_path / "a.nc", tmp_path / "less.nc"]
     read = read_mission("ionian", first_member(files))
-    with pytest.raises(InputError, match="have different points or times, so they have no mean"):
+    with pytest.raises(InputError, match=r"a\.nc and less\.nc have different points: .*; cut them alike"):
         from_files(read, files)
+    doubled.assign_coords(time=doubled.time + np.timedelta64(5, "D")).to_netcdf(
+        tmp_path / "later.nc", engine="h5netcdf"
+    )
+    with pytest.raises(InputError, match=r"a\.nc and later\.nc have different times: .*; cut them alike"):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "later.nc"])
+    with pytest.raises(
+        InputError, match=r"members a\.nc and a\.nc hold the same currents; leave one of them out"
+    ):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "a.nc"])
+
+
+def test_the_mean_of_rising_members_knows_how_fast_it_may_rise():
+    extent = Extent(0.0, 1.0, 0.0, 1.0, -math.inf, math.inf, 1.0, 1.0)
+
+    def member(w):
+        values, axis = np.zeros((2, 2, 2, 2, 4)), np.zeros(2)
+        values[..., 2] = w
+        places = np.zeros((2, 2, 2)), 1.0, 1.0
+        return RisingOceanGrid(values, axis, axis, 1.0, axis, axis, 1.0, *places, abs(w), extent)
+
+    mean = _mean([member(0.01), member(-0.09)])
+    assert np.abs(mean.values[..., 2]).max() == pytest.approx(0.04)
+    assert mean.max_rise == 0.09
