@@ -2,13 +2,16 @@
 
 Of each polished route it checks: it costs no more than before; each leg ends where it should by another
 integrator, within 1 m in an analytic flow, 5 m in a file's; depths, horizon, polar and rules of surfacing hold; a
-second run gives the same bits, on one thread and on two.
+second run gives the same bits, on one thread and on two. With a file also among closed areas, 3 km apart:
+no point of a route lies in one, by matplotlib's own test.
 
     python benchmarks/polish_trouble.py --queries 20 --ionian CURRENTS.nc
 """
 
 import argparse
+import json
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -16,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.path import Path as Polygon
 from polished_routes import worst_end
 from record import keep
 
@@ -39,6 +43,42 @@ CASES: dict[str, tuple[str, list[str], dict[str, Any]]] = {
 }
 
 
+AMONG = "ionian, closed areas"
+SIDE, APART = 0.05, 0.085
+"""The side of each closed area, and how far their corners lie apart [degrees]."""
+BETWEEN = ["query.start=[18.305, 38.1, 0.0]", "query.goal=[18.815, 37.75, 0.0]"]
+LOOKS = 5.0
+"""A route is looked at this often [m]."""
+
+
+def closed_areas() -> list[list[tuple[float, float]]]:
+    """Corners lon, lat [degrees] of squares in the Ionian domain, every second column moved by half."""
+    areas = []
+    for column, west in enumerate(np.arange(18.24, 18.8, APART)):
+        for south in np.arange(37.7 + (column % 2) * APART / 2, 38.1, APART):
+            east, north = west + SIDE, south + SIDE
+            areas.append([(west, south), (east, south), (east, north), (west, north), (west, south)])
+    return areas
+
+
+def write_areas(file: Path) -> None:
+    """Write the closed areas as GeoJSON."""
+    polygons = [{"type": "Polygon", "coordinates": [area]} for area in closed_areas()]
+    features = [{"type": "Feature", "properties": {}, "geometry": polygon} for polygon in polygons]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+
+
+def in_closed_areas(road: Any, path: Any) -> bool:
+    """Whether a route enters a closed area."""
+    rows = path.trajectory[:, 1:4]
+    lengths = np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    looks = np.arange(0.0, along[-1], LOOKS)
+    points = np.stack([np.interp(looks, along, column) for column in rows.T], axis=1)
+    places = road.problem.to_lonlat(points)[:, :2]
+    return any(Polygon(area).contains_points(places).any() for area in closed_areas())
+
+
 def cases(ionian: Path | None) -> Iterator[tuple[str, Any, dict[str, Any], float]]:
     """Name, opened roadmap, options of a query, and how far [m] a leg may end from its stop."""
     for name, (scenario, overrides, asked) in CASES.items():
@@ -47,6 +87,11 @@ def cases(ionian: Path | None) -> Iterator[tuple[str, Any, dict[str, Any], float
         for name, cost in (("ionian", []), ("ionian, energy", ENERGY)):
             problem = read_scenario("ionian", [f"flow.file={ionian}", *cost]).problem()
             yield name, glider_stream.open(build_roadmap(problem)), {}, 5.0
+        with tempfile.TemporaryDirectory() as folder:
+            write_areas(Path(folder) / "closed.geojson")
+            sets = [f"flow.file={ionian}", f'terrain.keep_out=["{folder}/closed.geojson"]', *BETWEEN]
+            problem = read_scenario("ionian", sets).problem()
+            yield AMONG, glider_stream.open(build_roadmap(problem)), {}, 5.0
 
 
 def faults(road: Any, before: Any, after: Any, asked: dict[str, Any], off: float, most: float) -> list[str]:
@@ -103,6 +148,8 @@ def tried(name: str, road: Any, asked: dict[str, Any], most: float, queries: int
             after = road.query(*ends, **asked, polish=True)
         seconds.append(time.perf_counter() - began)
         off = worst_end(road, after)
+        if name == AMONG and (in_closed_areas(road, before) or in_closed_areas(road, after)):
+            wrong.append(f"{ends}: it enters a closed area")
         wrong += [f"{ends}: it {what}" for what in faults(road, before, after, asked, off, most)]
         if len(gains) < 3 and road.query(*ends, **asked, polish=True).as_dict() != after.as_dict():
             wrong.append(f"{ends}: two threads give another route")

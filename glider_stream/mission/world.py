@@ -245,7 +245,7 @@ def _axis(low: float, high: float, step: float) -> Array:
 
 
 def _check_size(points: int) -> None:
-    cure = "make `forecast_error.length_m` or `forecast_error.time_s` longer, or the domain smaller"
+    cure = "make `arrival.longest_hours` shorter, `forecast_error.length_m` longer, or the domain smaller"
     why = f"the forecast's grid would have {points:,} points, more than {MOST_POINTS:,}; {cure}"
     require(points <= MOST_POINTS, why)
 

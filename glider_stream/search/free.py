@@ -100,8 +100,11 @@ class FreePolisher(Polisher):
         """The object that computes legs."""
         return FreeAir(self.problem.evaluator)
 
-    def from_route(self, polisher: Polisher, chain: Chain, pieces: int) -> Chain | None:
-        """Return a route of real glides, cut into about this many pieces, as one that may hold its depth."""
+    def from_route(self, polisher: Polisher, chain: Chain, pieces: int, height: float = 1.0) -> Chain | None:
+        """Return a route of real glides, cut into about this many pieces, as one that may hold its depth.
+
+        `height`: the share of its heights above and below a line from start to goal.
+        """
         time = chain.glides.time
         counts = np.maximum(1, np.round(time / time.sum() * pieces).astype(np.int64))
         part = np.concatenate([np.arange(1, count + 1) / count for count in counts.tolist()])
@@ -109,6 +112,11 @@ class FreePolisher(Polisher):
         many = Glides(*(np.repeat(values, counts) for values in chain.glides))
         stops = polisher.air.along(begin, end, many, part)
         stops[part == 1.0] = chain.stops[1:]
+        if height != 1.0:
+            line = chain.stops[0, 2] + np.cumsum(np.repeat(time / counts, counts)) / time.sum() * (
+                chain.stops[-1, 2] - chain.stops[0, 2]
+            )
+            stops[:, 2] = line + height * (stops[:, 2] - line)
         return self.chain(np.vstack([chain.stops[:1], stops]), np.repeat(time / counts, counts), many.heading)
 
     def best(self, chain: Chain) -> Chain:

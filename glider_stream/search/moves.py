@@ -32,6 +32,8 @@ PIECES = 16
 HEIGHTS = (1.3, 1.5, 1.8, 2.5)
 """Small yos are this many times as high as the least change of depth; the later ones are for routes that cannot
 be flown with the first."""
+FLATTER = (1.0, 0.7, 0.4, 0.1)
+"""In water that rises a leg may be steeper than any glide; then this share of its heights is tried."""
 YO_PAYS = 1e-3
 """A yo must gain this share of the cost."""
 PAYS = 1e-5
@@ -71,7 +73,10 @@ def _with_small_yos(polisher: Polisher, chain: Chain) -> Chain | None:
         return None
     problem = replace(problem, evaluator=replace(problem.evaluator, flow=level))
     free = FreePolisher(problem, frozen=polisher.frozen)
-    way = free.from_route(polisher, chain, max(PIECES, len(chain.glides.time)))
+    shares = (1.0,) if level is polisher.problem.evaluator.flow else FLATTER
+    pieces = max(PIECES, len(chain.glides.time))
+    ways = (free.from_route(polisher, chain, pieces, share) for share in shares)
+    way = next((one for one in ways if one is not None), None)
     if way is None:
         return None
     way = free.best(way)
