@@ -79,7 +79,7 @@ def sooner(spent, one, other):
 
 
 @entry_point(nogil=True)
-def cheapest_ways(rows, position, turn, ahead, last, least, spent, before, settled):
+def cheapest_ways(rows, position, turn, ahead, last, least, spent, before, settled, wanted):
     """A* from the states of which `spent` (states,), what a way to them adds up, is finite.
 
     Without the costs `turn` (nodes,) of a turn from dive to climb a state is a node. With them state 2 n is node
@@ -89,9 +89,9 @@ def cheapest_ways(rows, position, turn, ahead, last, least, spent, before, settl
     so that neither the bound `ahead` nor the order of reading changes a way. Ends when nothing better can come,
     or, without a goal, when all that can be reached is reached.
 
-    Returns -1 at the end, or a state whose edges lie in a block that is not known: with that block known, the
-    same arrays, `least` (nodes,), which begins as NaN, and `settled` (states,), which begins as false, the next
-    call goes on.
+    Returns 0 at the end, or how many nodes it has written to `wanted`: the search comes to them next, each with
+    edges in another block that is not known. With these known, and with the same arrays, the next call goes on;
+    `least` (nodes,) begins as NaN, `settled` (states,) as false. It also writes to `known`.
     """
     phases = 1 if turn.size == 0 else 2
     best = math.inf
@@ -103,7 +103,8 @@ def cheapest_ways(rows, position, turn, ahead, last, least, spent, before, settl
         if spent[s] < math.inf and not settled[s]
     ]
     heapify(waiting)
-    while len(waiting) > 0:
+    lacking = 0
+    while len(waiting) > 0 and lacking < wanted.size:
         key, state = heappop(waiting)
         if key > best * ROUNDING:
             break
@@ -112,7 +113,11 @@ def cheapest_ways(rows, position, turn, ahead, last, least, spent, before, settl
         node = state // phases
         first, end = rows.indptr[node], rows.indptr[node + 1]
         if not all_known(rows.known, rows.block, first, end):
-            return state
+            rows.known[first // rows.block : (end - 1) // rows.block + 1] = True
+            wanted[lacking] = node
+            lacking += 1
+        if lacking > 0:
+            continue  # what is reached later may pass here
         settled[state] = True
         here = spent[state]
         for e in range(first, end):
@@ -129,4 +134,4 @@ def cheapest_ways(rows, position, turn, ahead, last, least, spent, before, settl
                 heappush(waiting, (soonest(ahead, position, least, spent, to, phases), to))
             elif there == spent[to] and here < there and sooner(spent, state, before[to]):
                 before[to] = state
-    return -1
+    return lacking

@@ -12,8 +12,6 @@ from ..base.arrays import Array, Bools, Index
 
 Span = tuple[int, int]
 """Edges from the first number to before the second."""
-AHEAD = 512
-"""When a search needs edges that are not read yet, they are read for this many places that come next."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +37,6 @@ class Blend:
 
 CHEAPEST, FASTEST = Blend(), Blend(0.0, 1.0)
 """A search for the least cost, and for the least time."""
-
-
-def coming(soonest: Array) -> Index:
-    """Return the AHEAD places that a search comes to next, by its value `soonest` (places,), inf for no place."""
-    some = np.flatnonzero(np.isfinite(soonest))
-    if some.size > AHEAD:
-        some = some[np.argpartition(soonest[some], AHEAD)[:AHEAD]]
-    return np.sort(some)
 
 
 class EdgeSource(Protocol):

@@ -387,12 +387,13 @@ class _StoredEdges:
         """Read targets and weights of some spans; InputError if the file is another one by now."""
         _check_same(self.path, self.identity)  # so its links are checked already
         with _errors_of(self.path), h5py.File(self.path, "r") as file:
+            columns = {name: file[f"edges/{name}"] for name in ("target", "cost", "time")}
             for first, last in spans:
-                target[first:last] = file["edges/target"][first:last]
-                weight[first:last] = self.blend.read(partial(self._column, file, slice(first, last)))
+                target[first:last] = columns["target"][first:last]
+                weight[first:last] = self.blend.read(partial(self._column, columns, slice(first, last)))
 
-    def _column(self, file: h5py.File, some: slice, name: str) -> Array:
-        values: Array = file[f"edges/{name}"][some]
+    def _column(self, columns: dict[str, h5py.Dataset], some: slice, name: str) -> Array:
+        values: Array = columns[name][some]
         _check_values(f"edges/{name}", values, self.path)
         return values
 

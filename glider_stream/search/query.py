@@ -20,7 +20,7 @@ from ..roadmap.pairs import Attached, LegFinder
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
 from ..roadmap.roadmap import Roadmap
-from ..roadmap.rows import CHEAPEST, FASTEST, Blend, EdgeRows, coming
+from ..roadmap.rows import CHEAPEST, FASTEST, Blend, EdgeRows
 from ..roadmap.slices import SlicedRoadmap
 from ..roadmap.step_error import check_steps
 from ..roadmap.store import StoredRoadmap
@@ -36,6 +36,8 @@ from .why_not import why_not
 NOTHING = Edge(int(Status.NO_HIT), *[math.nan] * 6)
 MOST_KEPT = 2
 """The edges of this many blends are kept: as a rule the scenario's cost, and time."""
+TOGETHER = 32
+"""When a search needs edges that are not read yet, the edges of this many nodes are read, in different blocks."""
 FAR = 20_000
 """With fewer nodes a bound of what remains to the goal takes longer than it saves."""
 
@@ -272,10 +274,13 @@ class Planner(RoutePlanner):
             reached, adds, turned = self._last(goals[0], blend)
             last[reached] = adds + turned
         turn = np.empty(0) if turns is None else blend.cost * turns
-        least, settled = np.full(nodes, math.nan), np.zeros(states, np.bool_)
-        ends = self.position, turn, ahead, last, least, spent, before, settled
-        while cheapest_ways(Rows(rows.indptr, rows.target, rows.weight, rows.block, rows.known), *ends) >= 0:
-            rows.need(coming(np.where(settled, math.inf, spent + np.repeat(least, phases))) // phases)
+        least = np.full(nodes, 0.0 if ahead is NOTHING_AHEAD else math.nan)
+        settled = np.zeros(states, np.bool_)
+        wanted = np.empty(TOGETHER, np.int64)
+        ends = self.position, turn, ahead, last, least, spent, before, settled, wanted
+        edges = rows.indptr, rows.target, rows.weight, rows.block
+        while lacking := cheapest_ways(Rows(*edges, rows.known), *ends):
+            rows.need(wanted[:lacking])
         return _Search(start, blend, rows, origin, spent, before)
 
     def _direct(self, start: End, goals: Sequence[End]) -> list[Edge]:

@@ -17,7 +17,7 @@ from ..kernels.timetable import earliest_arrivals
 from ..roadmap.pairs import Attached, NeighbourLegs
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
-from ..roadmap.rows import FASTEST, coming
+from ..roadmap.rows import FASTEST
 from ..roadmap.slices import SlicedRoadmap
 from ..roadmap.store import StoredRoadmap
 from .least_time import BESIDE, fastest_sink
@@ -27,6 +27,8 @@ AGREES = 0.01
 """A search and a flight agree if their arrivals differ by at most this [s]."""
 MOST_ROUNDS = 100
 """At most this many searches are made for one route."""
+AHEAD = 512
+"""When a search needs edges that are not read yet, they are read for this many nodes that come next."""
 LAST_LEGS_AT_ONCE = 32
 """If the goal is not a node, the last legs from this many nodes are found together."""
 
@@ -182,7 +184,9 @@ class _Query:
         ends = goal, self.least, latest, arrival, before, settled
         edges = self.departures, rows.indptr, rows.target, rows.weight, rows.block
         while earliest_arrivals(*edges, rows.known, *learnt, *ends) >= 0:
-            near = coming(np.where(settled, math.inf, arrival + self.least))
+            soonest = np.where(settled, math.inf, arrival + self.least)
+            ahead = min(AHEAD, settled.size) - 1
+            near = np.flatnonzero((soonest <= np.partition(soonest, ahead)[ahead]) & np.isfinite(soonest))
             slices = self._slice_of(arrival[near])
             last = slices + 1 == self.departures.size  # no row of this node follows
             rows.need(near[last] * self.departures.size + slices[last])

@@ -61,14 +61,14 @@ def search(position, indptr, target, weight, turn, start, goal, ahead, block):
         np.full(weight.size, np.nan),
         (last, np.full(NODES, np.nan), spent, before, np.zeros(states, bool)),
     )
-    while True:
-        state = cheapest_ways(Rows(indptr, target, seen, block, known), position, turn, ahead, *ends)
-        if state < 0:
-            return spent, before, known
-        node = state * NODES // states
-        lacking = next(n for n in range(indptr[node] // block, known.size) if not known[n])
-        known[lacking] = True
-        seen[lacking * block :][:block] = weight[lacking * block :][:block]
+    wanted = np.empty(3, np.int64)
+    edges = indptr, target, seen, block
+    while count := cheapest_ways(Rows(*edges, known.copy()), position, turn, ahead, *ends, wanted):
+        for node in wanted[:count]:
+            for n in range(indptr[node] // block, (indptr[node + 1] - 1) // block + 1):
+                known[n] = True
+                seen[n * block :][:block] = weight[n * block :][:block]
+    return spent, before, known
 
 
 def way(before, state):
@@ -118,7 +118,7 @@ def test_a_last_leg_to_a_goal_beside_the_nodes_ends_the_search():
     last[3] = 0.5
     ends = last, np.full(NODES, np.nan), spent, before, np.zeros(NODES, bool)
     rows = Rows(indptr, target, weight, weight.size, np.ones(1, bool))
-    assert cheapest_ways(rows, position, none, NOTHING_AHEAD, *ends) == -1
+    assert cheapest_ways(rows, position, none, NOTHING_AHEAD, *ends, np.empty(1, np.int64)) == 0
     assert spent[3] + last[3] == 2.5
     settled = ends[-1]
     assert settled[8]

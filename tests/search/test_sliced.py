@@ -14,8 +14,9 @@ from glider_stream.base.errors import InputError
 from glider_stream.base.threads import threads
 from glider_stream.kernels.edges import CONNECTED
 from glider_stream.kernels.flow import velocity
-from glider_stream.roadmap import rows, store
+from glider_stream.roadmap import store
 from glider_stream.roadmap.compare import difference
+from glider_stream.search import sliced as sliced_module
 from glider_stream.search.answer import planner_of
 from glider_stream.search.slice_planner import SlicePlanner
 from glider_stream.search.sliced import SliceSearch
@@ -90,7 +91,7 @@ def test_a_leg_from_end_to_end_is_looked_at(search):
 def test_a_roadmap_that_stays_in_its_file_gives_the_same_routes(search, tmp_path, monkeypatch):
     """Bit by bit, though it reads only some edges; a file that was written since, or is damaged, is refused."""
     monkeypatch.setattr(store, "CHUNK", 256)
-    monkeypatch.setattr(rows, "AHEAD", 1)
+    monkeypatch.setattr(sliced_module, "AHEAD", 1)
     file, position = tmp_path / "slices.h5", sliced().position
     store.write_roadmap(sliced(), file)
     beside = np.array([420.0, 380.0, 0.0]), np.array([1510.0, 640.0, -300.0])

@@ -9,7 +9,7 @@ import glider_stream
 from glider_stream import planner
 from glider_stream.base.errors import InputError
 from glider_stream.plot import roadmap as drawing
-from glider_stream.roadmap import rows, store
+from glider_stream.roadmap import store, verify
 from glider_stream.roadmap.roadmap import EDGE_FIELDS
 from glider_stream.scenario import scenario_of
 from glider_stream.search import query
@@ -35,7 +35,12 @@ def file(request, tmp_path_factory):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Blocks of 16 edges; every roadmap stays in its file, and its searches are directed by a bound."""
-    for module, name, value in ((store, "CHUNK", 16), (store, "LARGE", 0), (rows, "AHEAD", 1), (query, "FAR", 0)):
+    for module, name, value in (
+        (store, "CHUNK", 16),
+        (store, "LARGE", 0),
+        (query, "TOGETHER", 1),
+        (query, "FAR", 0),
+    ):
         monkeypatch.setattr(module, name, value)
 
 
@@ -107,3 +112,15 @@ def test_a_file_that_was_replaced_is_refused(file, small_blocks, tmp_path):
     copy.write_bytes(file.read_bytes()[:-1] + b"\0")
     with pytest.raises(InputError, match="has been replaced since it was opened; open it again"):
         opened.query()
+
+
+def test_of_a_large_roadmap_a_sample_is_verified_if_it_is_asked_for(file, small_blocks, monkeypatch, capsys):
+    monkeypatch.setattr(verify, "LOOKED_AT_ONCE", 100)
+    held = store.read_roadmap(file).edge_count
+    for options, edges in ((["--sample", 20], 20), ([], held)):
+        read = strict_json(command(capsys, "verify", file, *options, "--json").out)
+        assert (read["holds"], read["edges"], read["edges_held"]) == (True, edges, held)
+    assert (
+        "20 edges flown again, 20 of them by DOP853; the other"
+        in command(capsys, "verify", file, "--sample", 20).out
+    )
