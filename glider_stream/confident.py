@@ -10,7 +10,7 @@ from .mission.confidence.answer import Confidence, confidence_of
 from .mission.confidence.ensemble import Ensemble, drawn, first_member, from_files
 from .mission.confidence.judged import Criterion
 from .mission.settings import Mission, read_mission
-from .pilot.export import check_export, export_path
+from .pilot.export import check_export, check_places, export_path
 from .search.flown_on import check_plan
 from .search.path import Path, check_frame, load_path
 
@@ -48,6 +48,7 @@ def answered(
     given = [*first_member(members), *overrides] if members else overrides
     resolved = mission if isinstance(mission, Mission) else read_mission(mission, given)
     criterion = _criterion(best, by, resolved.arrival.longest)
+    check_places(outputs, resolved.scenario.domain.frame() is not None)
     ensemble = drawn(resolved, draws, first) if draws is not None else from_files(resolved, members)
     named = [(File(route).name, load_path(route)) for route in routes]
     if named:

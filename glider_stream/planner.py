@@ -96,6 +96,29 @@ def build(
     return read_any_roadmap(output)
 
 
+def build_opened(
+    scenario: str | File | Scenario,
+    output: str | File,
+    *,
+    threads: int | None = None,
+    overrides: Sequence[str] = (),
+    restart: bool = False,
+    checkpoint: float | None = None,
+    scheduler: str | None = None,
+    base: str | File | Roadmap | SlicedRoadmap | None = None,
+    progress: Callable[[Progress], None] = lambda progress: None,
+) -> OpenedRoadmap:
+    """Build a roadmap into a file, as `build` does, and open it: the edges of a large roadmap stay in the file.
+
+    Examples:
+        >>> planner.build_opened("small.toml", "built.h5", restart=True).query().found
+        True
+    """
+    resolved = _resolved(scenario, output, overrides)
+    _build(resolved, output, threads, progress, None, restart, checkpoint, scheduler, base)
+    return open_roadmap(output)
+
+
 def build_part(
     scenario: str | File | Scenario,
     output: str | File,
@@ -425,9 +448,10 @@ def density(roadmap: AnyRoadmap) -> Density:
     return open_roadmap(roadmap).density()
 
 
-def verify(roadmap: str | File, sample: int = 200, *, overrides: Sequence[str] = ()) -> "Verification":
-    """Fly the legs of a roadmap file again, and a `sample` of them (0: all) by another integrator.
+def verify(roadmap: str | File, sample: int | None = None, *, overrides: Sequence[str] = ()) -> "Verification":
+    """Fly the legs of a roadmap file again, and a `sample` of them (None: 200, 0: all) by another integrator.
 
+    If a sample of a roadmap of more than two million edges is asked for, only that is read, and flown by both.
     `overrides`: see `glider_stream.open`.
 
     Examples:

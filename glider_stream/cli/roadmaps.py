@@ -63,9 +63,9 @@ def build(
             planner.build_part(scenario, output, shard, progress=progress, **run)
             done = f"part {shard} of a roadmap"
         else:
-            road = planner.build(scenario, output, progress=progress, **run)
-            dense = planner.density(road)
-            done, empty = f"{road}\n  dense:  {dense}", planner.why_no_edges(road) or dense.warning
+            road = planner.build_opened(scenario, output, progress=progress, **run)
+            dense = road.density()
+            done, empty = f"{road}\n  dense:  {dense}", road.why_no_edges() or dense.warning
     say(f"{done}\n  file:   {output}")
     if empty:
         say(f"note: {empty}", error=True)
@@ -96,8 +96,9 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
 def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
     """Show what ROADMAP holds."""
     from .. import planner
+    from ..opened import open
 
-    answer = planner.info(roadmap) if other is None else planner.differ(roadmap, other)
+    answer = open(roadmap) if other is None else planner.differ(roadmap, other)
     show(answer, as_json)
 
 
@@ -107,12 +108,11 @@ def info(roadmap: Path, other: Path | None, as_json: bool) -> None:
 @click.option(
     "--sample",
     type=int,
-    default=200,
-    show_default=True,
-    help="The number of edges to fly with the integrator DOP853; 0 for all.",
+    help="The number of edges to fly with the integrator DOP853, 200 if not given; 0 for all. In a roadmap of "
+    "more than two million edges, only these are looked at.",
 )
 @JSON
-def verify(roadmap: Path, overrides: tuple[str, ...], sample: int, as_json: bool) -> None:
+def verify(roadmap: Path, overrides: tuple[str, ...], sample: int | None, as_json: bool) -> None:
     """Fly the legs of ROADMAP again.
 
     A sample of them is flown by another integrator. Exit code 1 if a leg differs.

@@ -3,7 +3,7 @@
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ from ..base.settings import require
 from ..base.threads import threads
 from ..jobs.cluster import check_software, scheduler, software
 from ..kernels.cache import KERNEL_DIGEST
+from ..roadmap.problem import Problem
 from ..water.inspect import flow_sha256
 from .journal import Run, RunJournal
 from .run import Outcome, Runner
@@ -157,18 +158,14 @@ def simulate(
     fits = 1 <= processes <= most
     require(fits, f"`processes` must be from 1 to {most} on this machine, four for each core; got {processes}")
     runner = Runner(mission)
-    forecast = str(runner.worlds.world(0))
+    first = runner.worlds.world(0)
+    forecast = str(first)
     if keep is None:
         found = list(_found(runner, list(range(runs)), processes, address, progress, runs))
         return _campaign(mission, found, forecast)
     check_output(keep)
     target = keep.resolve()
-    identity = {
-        "mission": mission.text,
-        "true": flow_sha256(runner.worlds.true.evaluator.flow),
-        "software": version("glider-stream"),
-        "kernels": KERNEL_DIGEST,
-    }
+    identity = identity_of(mission, (first.true, first.forecast))
     kept, path = "", target.with_name(f"{target.name}.journal")
     with locked(target):
         try:
@@ -187,6 +184,20 @@ def simulate(
             cure = f"make room on its disk; {kept}: give the same command again to continue"
             raise InputError(f"the journal {path} cannot be written: {reason}; {cure}") from None
     return _campaign(mission, found, forecast)
+
+
+def identity_of(mission: Mission, waters: Sequence[Problem]) -> dict[str, str]:
+    """Return what tells a campaign from any other; `waters` are its problems: what is true, and run 0's forecast.
+
+    The mission's text names the files of currents and of closed areas, but not what they hold.
+    """
+    read = [part for water in waters for part in (water.evaluator.flow, water.evaluator.terrain)]
+    return {
+        "mission": mission.text,
+        "waters": " ".join(flow_sha256(part) for part in read),
+        "software": version("glider-stream"),
+        "kernels": KERNEL_DIGEST,
+    }
 
 
 def forget(keep: Path) -> None:

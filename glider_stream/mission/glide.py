@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array
-from ..kernels.cache import entry_point, kernel
-from ..kernels.flow import Flow, contains, rises
+from ..kernels.cache import entry_point, in_kernels, kernel
+from ..kernels.flow import Flow, by_rise, contains, rises
 from ..kernels.motion import landing_in_step, rk4_rising, rk4_step
 from ..kernels.place import Place, Velocity
 from ..kernels.terrain import Terrain, allowed
@@ -101,12 +101,20 @@ def heading_to(x, y, u, v, speed):  # type: ignore[no-untyped-def]
     return math.atan2(ey * along - ex * across, ex * along + ey * across)
 
 
-@kernel
-def _step(flow, here, through, step, depth):  # type: ignore[no-untyped-def]
+Stepped = tuple[float, float, float, float, bool]
+
+
+def _step(flow: Flow, here: Place, through: Velocity, step: float, depth: float) -> Stepped:
     """Return the place x, y, z [m] after a step, its length [s], and whether the glide is at its depth."""
-    if not rises(flow):
-        x, y = rk4_step(flow, here, through, step)
-        return x, y, here.z + through.w * step, step, False
+    return _STEP[rises(flow)](flow, here, through, step, depth)
+
+
+def _step_level(flow: Flow, here: Place, through: Velocity, step: float, depth: float) -> Stepped:
+    x, y = rk4_step(flow, here, through, step)
+    return x, y, here.z + through.w * step, step, False
+
+
+def _step_rising(flow: Flow, here: Place, through: Velocity, step: float, depth: float) -> Stepped:
     x, y, z = rk4_rising(flow, here, through, step)
     if through.w == 0.0:  # it stays at its depth
         return x, y, here.z, step, False
@@ -115,6 +123,10 @@ def _step(flow, here, through, step, depth):  # type: ignore[no-untyped-def]
         x, y, since = landing_in_step(flow, here, z, through, step, depth)
         return x, y, depth, since, True
     return x, y, min(z, 0.0), step, False  # nothing lifts a vehicle above the surface
+
+
+_STEP = (_step_level, _step_rising)
+in_kernels(_step, by_rise(*_STEP))
 
 
 @kernel

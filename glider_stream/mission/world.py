@@ -71,20 +71,9 @@ class Worlds:
         self.mission = mission
         self.true = (mission.truth or mission.scenario).problem()
         forecast = mission.scenario.problem() if mission.truth is not None else self.true
-        until = self.true.departure + mission.arrival.longest
         for name, problem in (("true current", self.true), ("forecast", forecast)):
-            known = problem.evaluator.flow.extent
-            cure = "shorten `arrival.longest_hours`, or leave earlier"
-            why = f"a run may last until {until:g} s, and the {name} is known until {known.t_hi:g} s; {cure}"
-            require(until <= known.t_hi, why)
-        for name in ("start", "goal"):
-            point = getattr(self.true, name)
-            why = f"a mission needs `query.{name}` in its scenario; add it"
-            require(point is not None, why)
-            assert point is not None
-            self.true.check_point(point, name)
-            up = float(point[2]) == 0.0
-            require(up, f"a mission begins and ends at the surface; got a {name} at a depth of {-point[2]:g} m")
+            check_known(problem, mission, name)
+        check_ends(self.true)
         self._sample = _points(self.true, mission.arrival.longest)
         self._speed = _rms(self._read(self.true.evaluator.flow))
         self._fixed = None if mission.truth is None else self._made(forecast, 0.0)
@@ -116,6 +105,26 @@ class Worlds:
         error = _rms(self._read(flow) - self._read(true.evaluator.flow))
         sides = (float(lo[0]), float(hi[0])), (float(lo[1]), float(hi[1])), (float(lo[2]), float(hi[2]))
         return World(true, forecast, error, self._speed, off, divergence_ratio(flow, *sides, true.departure))
+
+
+def check_known(problem: Problem, mission: Mission, name: str) -> None:
+    """Raise InputError unless a current, `name` in words, is known for the time of a run."""
+    known, until = problem.evaluator.flow.extent, problem.departure + mission.arrival.longest
+    cure = "shorten `arrival.longest_hours`, or leave earlier"
+    why = f"a run may last until {until:g} s, and the {name} is known until {known.t_hi:g} s; {cure}"
+    require(until <= known.t_hi, why)
+
+
+def check_ends(problem: Problem) -> None:
+    """Raise InputError unless a mission's scenario names a start and a goal, both at the surface."""
+    for name in ("start", "goal"):
+        point = getattr(problem, name)
+        why = f"a mission needs `query.{name}` in its scenario; add it"
+        require(point is not None, why)
+        assert point is not None
+        problem.check_point(point, name)
+        up = float(point[2]) == 0.0
+        require(up, f"a mission begins and ends at the surface; got a {name} at a depth of {-point[2]:g} m")
 
 
 def rms_speed(problem: Problem, longest: float) -> float:
@@ -190,7 +199,8 @@ def _times(flow: kernel.Flow, settings: ForecastError, departure: float, longest
     steps = [longest]
     if not isinstance(settings.time_s, str):
         steps.append(settings.time_s / PER_LENGTH)
-    period = None if is_steady(flow) else getattr(flow, "period", None)
+    moves = isinstance(flow, kernel.Rolls) and not is_steady(flow)
+    period = kernel.cycle(flow) if moves else None if is_steady(flow) else getattr(flow, "period", None)
     if period is not None:
         steps.append(period / PER_PERIOD)
     count = max(2, math.ceil(longest / min(steps)) + 1)
@@ -225,6 +235,8 @@ def _fitting_axes(true: Problem, settings: ForecastError) -> tuple[Array, Array,
     deep = math.inf if isinstance(settings.depth_m, str) else settings.depth_m / PER_LENGTH
     if isinstance(evaluator.flow, kernel.Vortices):
         deep = min(deep, float(evaluator.flow.thickness.min()) / PER_LENGTH)
+    if kernel.rises(evaluator.flow):
+        deep = min(deep, known.length_scale / PER_LENGTH)
     return x, y, _axis(float(true.lo[2]), 0.0, deep)
 
 

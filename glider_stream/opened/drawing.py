@@ -32,12 +32,12 @@ def draw(
     free = searches.planner(Surfacing())  # this also compares the water with the roadmap's
     if route is None:
         cure = "draw a route over it, or build its roadmap"
-        require(searches.road is not None, f"a scenario has no roadmap to draw; {cure}")
-        road, problem, title = searches.road, searches.problem, title
+        require(searches.source is not None, f"a scenario has no roadmap to draw; {cure}")
+        assert searches.source is not None
+        road, problem = searches.source if searches.source.departures is None else searches.road, searches.problem
         assert road is not None
-        if isinstance(
-            road, SlicedRoadmap
-        ):  # draw the slice nearest to the departure, over the current of its time
+        if isinstance(road, SlicedRoadmap):
+            # draw the slice nearest to the departure, over the current of its time
             number = int(np.abs(road.departures - problem.departure).argmin())
             problem = problem.leaving(float(road.departures[number]) - problem.departure)
             which = f"slice {number + 1} of {road.departures.size}"

@@ -10,16 +10,14 @@ from ..base.settings import require
 from ..roadmap.inputs import settings_sha256
 from ..roadmap.roadmap import Roadmap
 from ..roadmap.slices import SlicedRoadmap
-from ..roadmap.store import opened_roadmap
+from ..roadmap.store import KeptRoadmap, opened_roadmap
 from ..scenario import Scenario, read_scenario, scenario_from_text, shipped_scenarios
 from ..search.path import Path, load_path
 from .questions import OpenedRoadmap, OpenedScenario
 from .searches import Nodes, Searches
 
 
-def open(
-    roadmap: str | File | Roadmap | SlicedRoadmap | OpenedRoadmap, overrides: Sequence[str] = ()
-) -> OpenedRoadmap:
+def open(roadmap: str | File | KeptRoadmap | OpenedRoadmap, overrides: Sequence[str] = ()) -> OpenedRoadmap:
     """Open a roadmap (a file or an object) for any number of queries.
 
     `overrides`, such as "flow.file=currents.nc", give the new place of a file that the scenario reads; a file
@@ -39,7 +37,7 @@ def open(
         return OpenedRoadmap(replace(before.searches.source, elsewhere=tuple(overrides)), before.title)
     if isinstance(roadmap, OpenedRoadmap):
         return roadmap
-    if isinstance(roadmap, Roadmap | SlicedRoadmap):
+    if isinstance(roadmap, KeptRoadmap):
         return OpenedRoadmap(roadmap)
     return OpenedRoadmap(opened_roadmap(roadmap), File(roadmap).stem)
 

@@ -13,9 +13,9 @@ from ..pilot.slocum_files import MOST_WAYPOINTS
 from ..pilot.windows import HOURS
 from ..roadmap.density import Density, density_of
 from ..roadmap.problem import Problem
-from ..roadmap.roadmap import Roadmap
+from ..roadmap.roadmap import BaseRoadmap, Roadmap
 from ..roadmap.slices import SlicedRoadmap
-from ..roadmap.store import StoredRoadmap
+from ..roadmap.store import KeptRoadmap
 from ..scenario import Scenario
 from ..search.answer import front
 from ..search.assembly import RoutePlanner
@@ -304,7 +304,7 @@ class OpenedRoadmap(OpenedScenario):
         True
     """
 
-    def __init__(self, roadmap: Roadmap | SlicedRoadmap | StoredRoadmap, title: str = "") -> None:
+    def __init__(self, roadmap: KeptRoadmap, title: str = "") -> None:
         """Keep a roadmap; `title` is the title of figures."""
         super().__init__(Searches(None, roadmap), title)
 
@@ -322,10 +322,7 @@ class OpenedRoadmap(OpenedScenario):
             >>> road.why_no_edges()
             ''
         """
-        if self.roadmap.target.size:
-            return ""
-        one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
-        return no_edges(one, self.problem)
+        return no_edges(self._one, self.problem)
 
     def density(self) -> Density:
         """Return how far nodes lie apart in the vehicle's legs, and in how many directions legs leave them.
@@ -334,8 +331,24 @@ class OpenedRoadmap(OpenedScenario):
             >>> print(road.density())
             nodes 95 m apart at a depth, 0.45 legs; legs in 7 of 36 directions from a node
         """
-        one = self.roadmap.at(0) if isinstance(self.roadmap, SlicedRoadmap) else self.roadmap
-        return density_of(one, float(polar(self.scenario.glider).best_angle.max()))
+        return density_of(self._one, float(polar(self.scenario.glider).best_angle.max()))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the table that `info --json` prints."""
+        return self._told.as_dict()
+
+    @property
+    def _told(self) -> BaseRoadmap:
+        """The roadmap; if it has one departure and stays in its file, it is not read."""
+        source = self.searches.source
+        assert source is not None
+        return source if source.departures is None else self.roadmap
+
+    @property
+    def _one(self) -> BaseRoadmap:
+        """The roadmap, of several departures its first slice."""
+        told = self._told
+        return told.at(0) if isinstance(told, SlicedRoadmap) else told
 
     def __str__(self) -> str:
-        return str(self.roadmap)
+        return str(self._told)

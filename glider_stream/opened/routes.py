@@ -7,7 +7,7 @@ from typing import Any
 
 from ..base.output import check_output
 from ..base.settings import require
-from ..pilot.export import check_export, check_legs, export_path
+from ..pilot.export import check_export, check_legs, check_places, export_path
 from ..search.answer import Ends, best_path
 from ..search.assembly import RoutePlanner
 from ..search.path import Path
@@ -47,6 +47,7 @@ def routed(
     """Return the cheapest path between two `ends` of a planner, and write it; see `query`."""
     asked = None if within is None and seconds is None else Asked(within, seconds)
     outputs, roadmaps = split_outputs(outputs, asked is not None)
+    check_places(outputs, searches.problem.to_lonlat is not None)
 
     def refine(path: Path, polish: Callable[[Path], Path] | None) -> Path:
         assert asked is not None

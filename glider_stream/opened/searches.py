@@ -13,7 +13,7 @@ from ..roadmap.builder import node_positions
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import EdgeTable, Roadmap
 from ..roadmap.slices import SlicedRoadmap
-from ..roadmap.store import StoredRoadmap
+from ..roadmap.store import KeptRoadmap, StoredRoadmap
 from ..scenario import Scenario, scenario_of
 from ..search.answer import Ends, planner_of, planner_on_demand
 from ..search.assembly import RoutePlanner
@@ -44,7 +44,7 @@ class Searches:
     def __init__(
         self,
         scenario: Scenario | None,
-        source: Roadmap | SlicedRoadmap | StoredRoadmap | None = None,
+        source: KeptRoadmap | None = None,
         nodes: Nodes | None = None,
     ) -> None:
         """Keep a `scenario`, or a roadmap with its own; `nodes` are searched instead of the scenario's.

@@ -298,6 +298,13 @@ def check_export(file: str | File) -> None:
     check_output(file)
 
 
+def check_places(files: Sequence[str | File], geographic: bool) -> None:
+    """Raise InputError if one of the files needs longitude and latitude, and the scenario has none."""
+    for file in files:
+        fits = geographic or _form(file) in ANYWHERE
+        require(fits, f"the route file {file} needs longitude and latitude; plan in a geographic scenario")
+
+
 def check_legs(path: Path, files: Sequence[str | File]) -> None:
     """Raise InputError if the path has no leg and one of the files must hold legs."""
     for file in files:
@@ -316,8 +323,7 @@ def export_path(
     """
     check_export(file)
     form, place, chosen = _form(file), File(file), Options(**options)
-    geographic = path.lonlat is not None or form in ANYWHERE
-    require(geographic, f"the route file {file} needs longitude and latitude; plan in a geographic scenario")
+    check_places([file], path.lonlat is not None)
     if not path.found and form != ".json":
         older = "; the file of that name is of an earlier query" if place.exists() else ""
         say(f"{file} is not written, because no path was found{older}")

@@ -8,7 +8,7 @@ from ..base.settings import require
 from ..search.path import Path
 from ..water.frame import wrapped
 from .route_columns import NotARoute
-from .waypoints import degrees_and_minutes, from_degrees_and_minutes, waypoints
+from .waypoints import degrees_and_minutes, from_degrees_and_minutes, plain_number, waypoints
 
 RADIUS = 200.0
 """A target counts as reached at this distance [m], unless the pilot gives another."""
@@ -101,7 +101,7 @@ def target_faults(text: str) -> list[str]:
 
 def _within(text: str, least: float, most: float) -> bool:
     try:
-        return least <= float(text) <= most
+        return least <= plain_number(text) <= most
     except ValueError:
         return False
 

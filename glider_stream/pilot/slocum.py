@@ -11,7 +11,7 @@ from pathlib import Path as File
 import numpy as np
 
 from ..base.settings import require
-from ..search.path import Path
+from ..search.path import FROZEN, Path
 from ..water.frame import wrapped
 from .slocum_files import (
     LEAST_DEPTH,
@@ -183,8 +183,10 @@ def _written_again(text: str, part: int, first: str) -> str | None:
     """Return what this program would write for the waypoints of a list; None if the list cannot be ours."""
     file = read_mission_file(text)
     radius = next((argument.value for argument in file.arguments if argument.name == "list_when_wpt_dist"), "")
+    note = f"# {FROZEN}\n"
     try:
         rows = [[from_degrees_and_minutes(part) for part in row.split()] for _, row in file.rows]
-        return goto_list([Waypoint(lon, lat) for lon, lat in rows], float(radius), part, first)
+        again = goto_list([Waypoint(lon, lat) for lon, lat in rows], float(radius), part, first)
+        return note + again if text.startswith(note) else again
     except ValueError:
         return None

@@ -9,7 +9,7 @@ import re
 from typing import NamedTuple
 
 from .route_columns import NotARoute
-from .waypoints import from_degrees_and_minutes
+from .waypoints import from_degrees_and_minutes, plain_number
 
 MOST_WAYPOINTS = 8
 """A goto list may hold this many waypoints; a vehicle can be compiled with another number."""
@@ -239,7 +239,7 @@ def _values(file: MissionFile, known: dict[str, Bounds], faults: list[str]) -> d
         if unit != bounds.unit.lower():
             faults.append(f"{name} has the unit {argument.unit}; write {name}({bounds.unit})")
         try:
-            value = float(argument.value)
+            value = plain_number(argument.value)
         except ValueError:
             faults.append(f"{name} must be one number; got {argument.value!r}")
             continue

@@ -30,14 +30,21 @@ def skipped(path: Path, radius: float) -> list[str]:
 
     `radius` [m]: at this distance a waypoint counts as reached.
     """
-    ends = [leg.end for leg in path.legs[:-1] if leg.end[2] >= -SURFACE] + [path.goal]
+    ends = [path.start, *(leg.end for leg in path.legs[:-1] if leg.end[2] >= -SURFACE), path.goal]
     apart = [math.dist(a[:2], b[:2]) for a, b in pairwise(ends)]
     near = sum(distance <= radius for distance in apart)
     if not near:
         return []
     cure = "set a smaller --arrival-radius, or plan fewer surfacings"
-    lie = f"{near} of the {len(ends)} waypoints {'lies' if near == 1 else 'lie'} within the arrival radius of"
-    return [f"{lie} {radius:g} m of the one before, so a vehicle flies past, not to them; {cure}"]
+    lie = f"{near} of the {len(apart)} waypoints {'lies' if near == 1 else 'lie'} within the arrival radius of"
+    return [f"{lie} {radius:g} m of the one before, or of the start, so a vehicle does not fly to them; {cure}"]
+
+
+def plain_number(text: str) -> float:
+    """Return the number in a vehicle's file; ValueError if only Python reads it as one, such as 1_8."""
+    if "_" in text:
+        raise ValueError(f"{text} is no number that a vehicle reads")
+    return float(text)
 
 
 def degrees_and_minutes(degrees: float) -> str:
@@ -52,7 +59,7 @@ def degrees_and_minutes(degrees: float) -> str:
 
 def from_degrees_and_minutes(text: str) -> float:
     """Return the degrees of a text DDDMM.mmmm; ValueError if it is not such a number."""
-    packed = float(text)
+    packed = plain_number(text)
     whole, minutes = divmod(abs(packed), 100)
     if not minutes < 60 or whole > 180:
         raise ValueError(f"{text} has {minutes:g} minutes or too many degrees")

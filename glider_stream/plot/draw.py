@@ -11,6 +11,7 @@ from ..base.output import check_output
 from ..base.settings import require
 from ..roadmap.problem import Problem
 from ..roadmap.roadmap import Roadmap
+from ..roadmap.store import StoredRoadmap
 from ..search.path import Path, check_frame, placed
 from ..water.inspect import is_steady
 from .canvas import EARLIEST, check_figure, save_figure
@@ -53,7 +54,11 @@ def check_water(problem: Problem, route: Path, name: str) -> None:
 
 
 def draw_roadmap(
-    road: Roadmap, problem: Problem, output: str | File | None, depths: Sequence[float] | None, title: str
+    road: Roadmap | StoredRoadmap,
+    problem: Problem,
+    output: str | File | None,
+    depths: Sequence[float] | None,
+    title: str,
 ) -> "Figure":
     """Draw the roadmap at one depth [m]."""
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Index
-from .roadmap import Roadmap
+from .roadmap import BaseRoadmap
 
 SECTORS = 36
 """Directions are counted in this many sectors of 10 degrees each."""
@@ -55,14 +55,15 @@ class Density:
         )
 
 
-def density_of(roadmap: Roadmap, best_angle: float) -> Density:
+def density_of(roadmap: BaseRoadmap, best_angle: float) -> Density:
     """Return the density of a roadmap; `best_angle` [rad] is the angle of the fastest glide."""
     position = roadmap.position
     some = np.unique(np.linspace(0, len(position) - 1, SAMPLED).astype(np.int64))
     directions = []
-    for node in some:
-        row = slice(roadmap.indptr[node], roadmap.indptr[node + 1])
-        way = position[roadmap.target[row], :2] - position[node, :2]
+    rows = [np.arange(*roadmap.indptr[node : node + 2]) for node in some]
+    targets = np.split(roadmap.targets(np.concatenate(rows)), np.cumsum([row.size for row in rows])[:-1])
+    for node, target in zip(some, targets, strict=True):
+        way = position[target, :2] - position[node, :2]
         if len(way):
             turn = np.arctan2(way[:, 1], way[:, 0]) / math.tau
             directions.append(np.unique(np.floor(turn * SECTORS).astype(int) % SECTORS).size)

@@ -340,6 +340,8 @@ class StoredRoadmap(BaseRoadmap):
         return found
 
 
+KeptRoadmap = Roadmap | SlicedRoadmap | StoredRoadmap
+"""A roadmap, in memory or in its file."""
 LARGE = 64 * CHUNK
 """A roadmap of more edges than this, 100 MB, stays in its file when it is opened."""
 

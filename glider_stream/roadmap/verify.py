@@ -9,28 +9,33 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Bools, Index
 from ..base.errors import InputError
 from ..base.settings import require
 from ..base.terminal import plain
 from ..base.threads import in_parallel, threads
 from ..kernels.cache import entry_point
 from ..kernels.control import control_of, glide_speed
-from ..kernels.edges import CONNECTED, EDGE_COLUMNS, GLIDE_ANGLE, HEADING, SPEED, TIME
+from ..kernels.edges import CONNECTED, GLIDE_ANGLE, HEADING, SPEED, TIME
 from ..kernels.flow import currents, rises, velocities
 from ..kernels.motion import step_on
 from ..kernels.place import Place
 from .evaluator import Evaluator
 from .problem import Problem
 from .provenance import check_unchanged
-from .roadmap import EDGE_FIELDS, Roadmap
+from .roadmap import EDGE_FIELDS, BaseRoadmap
+from .rows import FASTEST
 from .slices import SlicedRoadmap
-from .store import read_any_roadmap
+from .store import KeptRoadmap, StoredRoadmap, opened_roadmap
 
 LEGS_AT_ONCE = 10
 """DOP853 flies this many legs together; its step must be small enough for the most curved of them."""
 EDGES_AT_ONCE = 4096
 """A thread flies this many edges at a time."""
+LOOKED_AT_ONCE = 1 << 19
+"""So many edges are in memory at a time, 30 MB of them."""
+SAMPLE = 200
+"""As a rule this many edges are also flown by DOP853."""
 SAME = 0.3
 """The same integrator must find the same miss within this distance [m]. A closest approach is measured on the
 chord of a step, and the arc of a step of 13 m that turns by 0.15 rad is up to 0.24 m away from its chord."""
@@ -44,7 +49,7 @@ QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
 @dataclass(frozen=True)
 class Verification:
-    """The result of a verification: `edges` were flown again, `sample` of them also by DOP853.
+    """The result of a verification: `edges` of all `held` were flown again, `sample` of them also by DOP853.
 
     `faults` are sentences; the tuple is empty if nothing is wrong. `differences` (sample,) [m] lie between
     DOP853's miss and the roadmap's. `worst` holds the worst edges: source, target, difference [m].
@@ -56,6 +61,7 @@ class Verification:
     faults: tuple[str, ...]
     differences: Array
     worst: tuple[tuple[int, int, float], ...]
+    held: int
 
     @property
     def holds(self) -> bool:
@@ -75,6 +81,7 @@ class Verification:
             "holds": self.holds,
             "faults": list(self.faults),
             "edges": self.edges,
+            "edges_held": self.held,
             "sample": self.sample,
             "difference_m": self._quantiles(),
             "worst": [{"source": a, "target": b, "difference_m": off} for a, b, off in self.worst],
@@ -84,7 +91,9 @@ class Verification:
         lines = [f"{plain(self.file)}: {'verified' if self.holds else 'NOT what it says'}"]
         lines += [f"  fault: {plain(fault)}" for fault in self.faults]
         if self.edges:
-            lines.append(f"  {self.edges:,} edges flown again, {self.sample:,} of them by DOP853")
+            left = self.held - self.edges
+            others = f"; the other {left:,} were not looked at" if left else ""
+            lines.append(f"  {self.edges:,} edges flown again, {self.sample:,} of them by DOP853{others}")
         if self.differences.size:
             spread = ", ".join(f"{share} {1000 * off:.1f} mm" for share, off in self._quantiles().items())
             lines.append(f"  its misses differ by: {spread}")
@@ -162,24 +171,30 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
 
 
 def verify(
-    file: str | Path, problem_of: Callable[[Roadmap | SlicedRoadmap], Problem], sample: int = 200
+    file: str | Path, problem_of: Callable[[KeptRoadmap], Problem], sample: int | None = None
 ) -> Verification:
     """Check that a roadmap file is whole, that its flow and glider are unchanged, and that its legs are right.
 
     `problem_of` makes the problem of a roadmap. All edges are flown again by the roadmap's integrator. A `sample`
-    of them, all if it is 0, is also flown by DOP853.
+    of them, SAMPLE if it is None, all if it is 0, is also flown by DOP853. If a sample of a large roadmap of one
+    departure is asked for, only that is read.
     """
-    require(sample >= 0, f"`sample` must be at least 0, all; got {sample}")
+    require(sample is None or sample >= 0, f"`sample` must be at least 0, all; got {sample}")
     require(Path(file).is_file(), f"the roadmap {file} does not exist; build it first")
     try:
-        road = read_any_roadmap(file)
+        road: KeptRoadmap = opened_roadmap(file)
+        if isinstance(road, StoredRoadmap) and road.departures is not None:
+            road = road.whole()
         problem = problem_of(road)
         check_unchanged(road, problem)
+        if isinstance(road, SlicedRoadmap):
+            return check_slices(str(file), road, problem, SAMPLE if sample is None else sample)
+        every = not sample or not isinstance(road, StoredRoadmap)
+        if every:
+            road.rows(FASTEST).need(np.arange(len(road.position)))  # its targets must rise, too
+        return check_edges(str(file), road, problem, SAMPLE if sample is None else sample, every)
     except InputError as error:
-        return Verification(str(file), 0, 0, (str(error),), np.empty(0), ())
-    if isinstance(road, SlicedRoadmap):
-        return check_slices(str(file), road, problem, sample)
-    return check_edges(str(file), road, problem, sample)
+        return Verification(str(file), 0, 0, (str(error),), np.empty(0), (), 0)
 
 
 def check_slices(name: str, road: SlicedRoadmap, problem: Problem, sample: int) -> Verification:
@@ -202,55 +217,87 @@ def check_slices(name: str, road: SlicedRoadmap, problem: Problem, sample: int) 
         tuple(faults),
         np.concatenate([part.differences for part in parts]),
         tuple(worst),
+        sum(part.held for part in parts),
     )
 
 
-def check_edges(name: str, road: Roadmap, problem: Problem, sample: int) -> Verification:
-    """Return the verification of a roadmap that was read without error."""
+def check_edges(name: str, road: BaseRoadmap, problem: Problem, sample: int, every: bool = True) -> Verification:
+    """Return the verification of a roadmap that was read without error: `every` edge, or only the sample."""
     evaluator, position = problem.evaluator, np.require(road.position, np.float64, ["C", "W"])
-    source = np.repeat(np.arange(len(position)), np.diff(road.indptr))
-    target = road.target.astype(np.int64)
-    edges = np.empty((target.size, EDGE_COLUMNS))
-    edges[:] = np.column_stack(
-        [np.full(target.size, CONNECTED), *(getattr(road, field) for field in EDGE_FIELDS)]
-    )
-    off = np.empty((target.size, 2))
-    with threads(None):
-        task = partial(_fly, evaluator.medium, position, problem.departure, source, target, edges, off)
-        in_parallel(task, target.size, EDGES_AT_ONCE)
-    horizon = evaluator.integration.dt * evaluator.integration.steps
-    polar = evaluator.polar
-    angle = np.abs(road.glide_angle)
-    direction = (road.glide_angle > 0).astype(np.intp)
-    rise = position[target, 2] - position[source, 2]
-    price = evaluator.cost.kernel()
+    count = road.edge_count
+    size = count if sample == 0 else min(sample, count)
+    some = np.sort(np.random.default_rng(0).choice(count, size, replace=False))
+    blocks = [some]
+    if every:
+        blocks = [np.arange(n, min(n + LOOKED_AT_ONCE, count)) for n in range(0, count, LOOKED_AT_ONCE)]
     in_water = evaluator.allowed(position, problem.departure)
-    looks = {
-        "lead to where they begin or to the same depth": (rise == 0) | (source == target),
-        "climb where they should dive, or dive": np.sign(rise) != np.sign(road.glide_angle),
-        "cost something else than the scenario says": road.cost != price.per_second * road.time + price.per_leg,
-        "take no time or longer than the horizon": (road.time <= 0)
-        | (road.time > horizon + evaluator.integration.dt),
-        "have a glide angle outside the polar": (angle < polar.shallowest[direction] - 1e-9)
-        | (angle > polar.steepest[direction] + 1e-9),
-        "have a speed that is not the polar's": np.abs(off[:, 1]) > 1e-6,
-        "miss by more than the tolerance": road.miss >= evaluator.integration.tolerance,
-        "begin or end where no glider may be": ~(in_water[source] & in_water[target]),
-        "do not end where they say": ~(np.abs(off[:, 0] - road.miss) <= SAME),
-    }
+    found: dict[str, list[tuple[int, int, int]]] = {}
+    for edges in blocks:
+        legs = _Legs.of(road, edges)
+        for what, bad in _looks(problem, position, in_water, legs).items():
+            if bad.any():
+                first = int(legs.source[bad][0]), int(legs.target[bad][0])
+                found.setdefault(what, []).append((int(bad.sum()), *first))
     faults = [
-        f"{int(bad.sum()):,} edges {what}, the first from node {source[bad][0]} to {target[bad][0]}"
-        for what, bad in looks.items()
-        if bad.any()
+        f"{sum(bad for bad, _, _ in blocks):,} edges {what}, the first from node {blocks[0][1]} to {blocks[0][2]}"
+        for what, blocks in found.items()
     ]
-    size = target.size if sample == 0 else min(sample, target.size)
-    some = np.sort(np.random.default_rng(0).choice(target.size, size, replace=False))
-    ends = evaluator, problem.departure, position, source[some], target[some], edges[some, TIME:]
-    differences = np.abs(replayed_misses(*ends) - road.miss[some])
+    legs = _Legs.of(road, some)
+    ends = evaluator, problem.departure, position, legs.source, legs.target, legs.values
+    differences = np.abs(replayed_misses(*ends) - legs.column("miss"))
     most = MOST_OFF * evaluator.integration.tolerance
     far = differences > most
     if far.any():
         faults.append(f"{int(far.sum()):,} edges of the sample end more than {most:g} m elsewhere by DOP853")
     order = np.argsort(-differences)[:WORST]
-    worst = tuple((int(source[some][n]), int(target[some][n]), float(differences[n])) for n in order)
-    return Verification(name, target.size, size, tuple(faults), differences, worst)
+    worst = tuple((int(legs.source[n]), int(legs.target[n]), float(differences[n])) for n in order)
+    flown = count if every else size
+    return Verification(name, flown, size, tuple(faults), differences, worst, count)
+
+
+@dataclass(frozen=True)
+class _Legs:
+    """Some edges of a roadmap: nodes `source` and `target` (n,), `values` (n, 6) in the order of EDGE_FIELDS."""
+
+    source: Index
+    target: Index
+    values: Array
+
+    @classmethod
+    def of(cls, road: BaseRoadmap, edges: Index) -> "_Legs":
+        """Read some edges (n,)."""
+        source = np.searchsorted(road.indptr, edges, side="right") - 1
+        return cls(source, road.targets(edges).astype(np.int64), road.legs(edges))
+
+    def column(self, name: str) -> Array:
+        """Return one of EDGE_FIELDS (n,)."""
+        return np.asarray(self.values[:, EDGE_FIELDS.index(name)])
+
+
+def _looks(problem: Problem, position: Array, in_water: Bools, legs: _Legs) -> dict[str, Bools]:
+    """Return, by what it would mean, which of some edges (n,) are wrong."""
+    evaluator, source, target = problem.evaluator, legs.source, legs.target
+    edges = np.column_stack([np.full(target.size, float(CONNECTED)), legs.values])
+    off = np.empty((target.size, 2))
+    with threads(None):
+        task = partial(_fly, evaluator.medium, position, problem.departure, source, target, edges, off)
+        in_parallel(task, target.size, EDGES_AT_ONCE)
+    horizon = evaluator.integration.dt * evaluator.integration.steps
+    polar, price = evaluator.polar, evaluator.cost.kernel()
+    time, miss, glide_angle = (legs.column(name) for name in ("time", "miss", "glide_angle"))
+    angle = np.abs(glide_angle)
+    direction = (glide_angle > 0).astype(np.intp)
+    rise = position[target, 2] - position[source, 2]
+    return {
+        "lead to where they begin or to the same depth": (rise == 0) | (source == target),
+        "climb where they should dive, or dive": np.sign(rise) != np.sign(glide_angle),
+        "cost something else than the scenario says": legs.column("cost")
+        != price.per_second * time + price.per_leg,
+        "take no time or longer than the horizon": (time <= 0) | (time > horizon + evaluator.integration.dt),
+        "have a glide angle outside the polar": (angle < polar.shallowest[direction] - 1e-9)
+        | (angle > polar.steepest[direction] + 1e-9),
+        "have a speed that is not the polar's": np.abs(off[:, 1]) > 1e-6,
+        "miss by more than the tolerance": miss >= evaluator.integration.tolerance,
+        "begin or end where no glider may be": ~(in_water[source] & in_water[target]),
+        "do not end where they say": ~(np.abs(off[:, 0] - miss) <= SAME),
+    }

@@ -7,7 +7,6 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.settings import require
-from ..kernels.flow import rises
 from ..roadmap.builder import node_positions
 from ..roadmap.problem import Problem
 from ..roadmap.provenance import check_unchanged
@@ -152,9 +151,7 @@ def polished(path: Path, planner: RoutePlanner) -> Path:
     bound = rule != Surfacing()
     fixed = bound or problem.to_lonlat is not None
     stays = (lambda stop: bool(stop[2] >= -SURFACE)) if fixed else (lambda stop: False)
-    # a glider that holds its depth leads to small yos, and in water that rises none can
-    single = not bound and not rises(problem.evaluator.flow)
-    polisher = Polisher.of(problem, path, stays=stays, frozen=planner.assembly.frozen, single_yos=single)
+    polisher = Polisher.of(problem, path, stays=stays, frozen=planner.assembly.frozen, single_yos=not bound)
     kept = replace(path, unpolished=(len(path.legs), path.travel_time, path.cost))
     chain = polisher.chain_of(path)
     if chain is None:

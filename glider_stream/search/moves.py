@@ -1,11 +1,12 @@
 """The changes of a route that polishing cannot make by small steps: cut and join legs, add and remove yos."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.arrays import Array, Index
+from ..water.sampled import level_part
 from .free import FreePolisher
 from .polish import Chain, Effort, Polisher
 from .yos import with_yos
@@ -61,9 +62,15 @@ def improve(polisher: Polisher, chain: Chain) -> Chain:
 def _with_small_yos(polisher: Polisher, chain: Chain) -> Chain | None:
     """Return the polished route with small yos along the best way of a glider that may hold its depth.
 
-    None if there is none, or if it does not gain YO_PAYS for each yo more.
+    None if there is none, or if it does not gain YO_PAYS for each yo more. A glider that holds its depth does so
+    against water that rises too, hardly slower; so the way is found without the vertical part of a grid.
     """
-    free = FreePolisher(polisher.problem, frozen=polisher.frozen)
+    problem = polisher.problem
+    level = level_part(problem.evaluator.flow)
+    if level is None:
+        return None
+    problem = replace(problem, evaluator=replace(problem.evaluator, flow=level))
+    free = FreePolisher(problem, frozen=polisher.frozen)
     way = free.from_route(polisher, chain, max(PIECES, len(chain.glides.time)))
     if way is None:
         return None

@@ -16,7 +16,7 @@ from ..base.clock import moment
 from ..kernels.edges import Status
 from ..kernels.flow import max_rise, velocities
 from ..roadmap.problem import Problem
-from ..roadmap.roadmap import Roadmap
+from ..roadmap.roadmap import BaseRoadmap
 
 FRONTIER = 32
 """The legs of this many reached nodes, the nearest to the goal, are evaluated again."""
@@ -325,12 +325,12 @@ def outrun(problem: Problem, starts: Array, ends: Array, departs: Array) -> Bool
     return np.asarray((length > 0) & ((np.abs(across) > fastest) | (headway <= 0.0)))
 
 
-def no_edges(road: Roadmap, problem: Problem) -> str:
+def no_edges(road: BaseRoadmap, problem: Problem) -> str:
     """Return a sentence that says why a roadmap has no edge; empty if it has edges.
 
     Legs of some of its nodes are evaluated again, because a law of neighbours may have proposed no pair.
     """
-    if road.target.size:
+    if road.edge_count:
         return ""
     some = road.position[np.unique(np.linspace(0, len(road.position) - 1, FRONTIER).astype(np.int64))]
     departs = np.full(len(some), problem.departure)

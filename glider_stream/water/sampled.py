@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from ..base.arrays import Array
 from ..base.checks import Range
 from ..base.settings import require
 from ..base.threads import in_parallel
@@ -54,13 +55,25 @@ def sample_flow(
     spaced = {"per_x": 1 / steps[0], "per_y": 1 / steps[1], "z_first": z[0], "per_z": 1 / steps[2]}
     if rises:
         return kernel.RisingGrid(values, **spaced, max_rise=float(np.abs(values[..., 2]).max()), extent=extent)
-    return kernel.Grid(
-        values=values,
-        level_speed=level_speed,
-        level_carry=np.concatenate([[0.0], np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 * steps[2])]),
-        **spaced,
-        extent=extent,
-    )
+    return kernel.Grid(values, level_speed, level_carry=_carry(level_speed, steps[2]), **spaced, extent=extent)
+
+
+def _carry(level_speed: Array, step: float) -> Array:
+    return np.concatenate([[0.0], np.cumsum((level_speed[1:] + level_speed[:-1]) / 2 * step)])
+
+
+def level_part(flow: kernel.Flow) -> kernel.Flow | None:
+    """Return the flow without its vertical part; None for a formula that has one."""
+    if not kernel.rises(flow):
+        return flow
+    if not isinstance(flow, kernel.RisingGrid | kernel.RisingOceanGrid):
+        return None
+    kept = flow._asdict() | {"values": np.ascontiguousarray(flow.values[..., :2])}
+    del kept["max_rise"]
+    if isinstance(flow, kernel.RisingOceanGrid):
+        return kernel.OceanGrid(**kept)
+    speed = np.hypot(flow.values[..., 0], flow.values[..., 1]).max(axis=(1, 2))
+    return kernel.Grid(**kept, level_speed=speed, level_carry=_carry(speed, 1 / flow.per_z))
 
 
 def sampling_error(flow: kernel.Flow, sampled: kernel.Flow, x: Range, y: Range, z: Range) -> float:

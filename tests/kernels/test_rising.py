@@ -11,7 +11,7 @@ from glider_stream.kernels.edges import STATUS, TIME, Status
 from glider_stream.kernels.legs import fly_legs
 from glider_stream.kernels.motion import traced
 from glider_stream.kernels.place import Place, Velocity
-from glider_stream.roadmap.steering import FlowMapMethod, StreamlineMethod
+from glider_stream.roadmap.steering import FlowMapMethod, StreamlineMethod, SurfaceMethod
 from glider_stream.roadmap.verify import replayed_misses
 from glider_stream.water.analytic import InternalWave, Upwelling
 
@@ -168,13 +168,16 @@ def test_a_pair_whose_depth_no_glide_reaches_has_a_status_of_its_own(judge, eval
 
 
 @pytest.mark.wide
-def test_the_paper_s_controls_are_flown_to_their_closest_approach(evaluator, uniform):
-    line = evaluator(uniform, StreamlineMethod, 16, tolerance=20.0)
+@pytest.mark.parametrize("method", [StreamlineMethod, SurfaceMethod])
+def test_the_paper_s_controls_are_flown_to_their_closest_approach(evaluator, uniform, method):
+    line = evaluator(uniform, method, 16 if method is StreamlineMethod else 400, tolerance=20.0)
     start, goal = np.array([0.0, 0.0, -20.0]), np.array([150.0, 200.0, -200.0])
     found = line.connect_pair(start, goal)
     assert found.status == Status.CONNECTED
     rows = line.trace(start, found, 0.0)
     assert np.linalg.norm(rows[-1, 1:] - goal) == pytest.approx(found.miss, abs=1e-9)
+    if method is SurfaceMethod:
+        return
     # in a uniform current each control is a straight line
     best = np.inf
     for angle, heading in line.control_line(start, goal, 16):
@@ -184,3 +187,17 @@ def test_the_paper_s_controls_are_flown_to_their_closest_approach(evaluator, uni
         if np.linalg.norm(start + time * over - goal) < 20.0:
             best = min(best, time)
     assert found.time == pytest.approx(best, abs=1e-6)
+
+
+@pytest.mark.wide
+def test_the_paper_s_line_is_a_first_guess_of_exact_legs(evaluator, judge, stretched, position):
+    line = evaluator(stretched, lambda candidates: StreamlineMethod(candidates, refine=True), 16)
+    source, others = np.array([5]), np.arange(6, 60)
+    ends = position, 0.0, source, np.array([0, others.size]), others
+    refined, exact = line.connect(*ends), judge.connect(*ends)
+    found, true = (rows[:, STATUS] == Status.CONNECTED for rows in (refined, exact))
+    assert found.sum() > 0.5 * true.sum() > 5
+    # the line may lead to another leg than the earliest
+    assert (refined[found & true, TIME] > exact[found & true, TIME] - 0.06).all()
+    legs = np.repeat(source, found.sum()), others[found], refined[found][:, TIME:]
+    assert replayed_misses(line, 0.0, position, *legs).max() < 0.1

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -13,8 +14,9 @@ from helpers.small import command
 from glider_stream import planner
 from glider_stream.base.errors import InputError, Stopped
 from glider_stream.jobs.cluster import Cluster
+from glider_stream.kernels.terrain import OpenWater
 from glider_stream.mission import campaign
-from glider_stream.mission.campaign import simulate
+from glider_stream.mission.campaign import identity_of, simulate
 from glider_stream.mission.run import Runner
 from glider_stream.mission.settings import read_mission, shipped_missions
 from glider_stream.mission.statistics import median, share
@@ -32,6 +34,18 @@ def folder(tmp_path_factory):
     assert policies in file.read_text()
     file.write_text(file.read_text().replace(policies, '"open-loop", "replan", "omniscient"'))
     return made
+
+
+def test_a_campaign_is_told_by_what_its_files_hold():
+    def water(rise, floor):
+        return SimpleNamespace(evaluator=SimpleNamespace(flow=OpenWater(rise), terrain=OpenWater(floor)))
+
+    told = SimpleNamespace(text="the same names of files")
+    true, forecast = water(1.0, -300.0), water(2.0, -300.0)
+    first = identity_of(told, (true, forecast))
+    assert identity_of(told, (water(1.0, -300.0), water(2.0, -300.0))) == first
+    assert identity_of(told, (water(1.0, -200.0), forecast)) != first  # other closed water
+    assert identity_of(told, (true, water(2.1, -300.0))) != first  # another forecast
 
 
 def small(folder, changes=()):

@@ -13,11 +13,11 @@ from helpers.small import command
 
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Status
-from glider_stream.kernels.flow import velocities
+from glider_stream.kernels.flow import Extent, RisingOceanGrid, velocities
 from glider_stream.mission.assimilating import corrected
 from glider_stream.mission.confidence.answer import confidence_of
 from glider_stream.mission.confidence.candidates import Search
-from glider_stream.mission.confidence.ensemble import drawn, first_member, from_files
+from glider_stream.mission.confidence.ensemble import _mean, drawn, first_member, from_files
 from glider_stream.mission.confidence.judged import Criterion, Flights, best_of, checked, lost_leg, quantile
 from glider_stream.mission.confidence.reach import reach_of
 from glider_stream.mission.pilot import plan_of
@@ -183,6 +183,7 @@ def test_the_command_chooses_and_looks_at_a_route(folder, capsys, monkeypatch):
         (["--draws", "2", "--best", "mean", "--by", "1"], "leave one out"),
         (["--draws", "9", "--best", "100%"], "must be between 0 % and 100 %; got 100%"),
         (["--draws", "2", "--best", "mean", "-o", "route.txt"], "route.txt"),
+        (["--draws", "2", "--best", "mean", "-o", "route.kml"], "route.kml needs longitude and latitude"),
     ],
 )
 def test_what_is_wrong_is_refused(folder, capsys, monkeypatch, arguments, sentence):
@@ -268,8 +269,34 @@ def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
     assert made.forecast.evaluator.flow.values == pytest.approx(1.5 * one, abs=1e-6)
     with pytest.raises(InputError, match=r"a\.nc holds no members: name a file that does, or one file for each"):
         from_files(read_mission("ionian", first_member([tmp_path / "a.nc"])), [tmp_path / "a.nc"])
+    low = read_mission("ionian", [*first_member([tmp_path / "both.nc"]), "query.start=[18.3, 38.1, 50.0]"])
+    with pytest.raises(InputError, match="begins and ends at the surface; got a start at a depth of 50 m"):
+        from_files(low, [tmp_path / "both.nc"])
     doubled.isel(depth=[0, 1, 3, 4]).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
     files = [tmp_path / "a.nc", tmp_path / "less.nc"]
     read = read_mission("ionian", first_member(files))
-    with pytest.raises(InputError, match="have different points or times, so they have no mean"):
+    with pytest.raises(InputError, match=r"a\.nc and less\.nc have different points: .*; cut them alike"):
         from_files(read, files)
+    doubled.assign_coords(time=doubled.time + np.timedelta64(5, "D")).to_netcdf(
+        tmp_path / "later.nc", engine="h5netcdf"
+    )
+    with pytest.raises(InputError, match=r"a\.nc and later\.nc have different times: .*; cut them alike"):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "later.nc"])
+    with pytest.raises(
+        InputError, match=r"members a\.nc and a\.nc hold the same currents; leave one of them out"
+    ):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "a.nc"])
+
+
+def test_the_mean_of_rising_members_knows_how_fast_it_may_rise():
+    extent = Extent(0.0, 1.0, 0.0, 1.0, -math.inf, math.inf, 1.0, 1.0)
+
+    def member(w):
+        values, axis = np.zeros((2, 2, 2, 2, 4)), np.zeros(2)
+        values[..., 2] = w
+        places = np.zeros((2, 2, 2)), 1.0, 1.0
+        return RisingOceanGrid(values, axis, axis, 1.0, axis, axis, 1.0, *places, abs(w), extent)
+
+    mean = _mean([member(0.01), member(-0.09)])
+    assert np.abs(mean.values[..., 2]).max() == pytest.approx(0.04)
+    assert mean.max_rise == 0.09

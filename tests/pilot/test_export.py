@@ -106,7 +106,7 @@ def test_degrees_and_minutes(degrees, packed):
     assert from_degrees_and_minutes(packed) == pytest.approx(degrees, abs=1e-6)
 
 
-@pytest.mark.parametrize("text", ["7460.0000", "-18100.0", "north", ""])
+@pytest.mark.parametrize("text", ["7460.0000", "-18100.0", "north", "", "74_11.5"])
 def test_texts_that_are_not_degrees_and_minutes(text):
     with pytest.raises(ValueError, match=r".*"):
         from_degrees_and_minutes(text)

@@ -59,6 +59,19 @@ def test_what_a_pilot_wrote_or_changed_stays(tmp_path):
     assert f"{changed} belongs to an earlier route and was changed by hand, so it stays" in said[2]
 
 
+def test_frozen_lists_of_an_earlier_route_are_removed_too(tmp_path):
+    export_path(replace(surfacings(20), frozen=True), tmp_path / "goto_l10.ma")
+    export_path(surfacings(3), tmp_path / "goto_l10.ma")
+    assert names(tmp_path) == ["goto_l10.ma", "yo10.ma"]
+
+
+def test_a_first_waypoint_within_the_radius_of_the_start_is_told(tmp_path):
+    said = []
+    export_path(surfacings(1), tmp_path / "targets", said.append, arrival_radius=1201.0)  # it lies 1200 m away
+    assert len(said) == 1
+    assert "1 of the 1 waypoints lies within the arrival radius of 1201 m" in said[0]
+
+
 def test_lists_of_another_route_stay(tmp_path):
     export_path(surfacings(3), tmp_path / "goto_l11.ma")
     said = []

@@ -21,7 +21,8 @@ def lattice(step, heights, ways):
     position = np.vstack([nodes, nodes[0], nodes[0] + ring])
     indptr = np.zeros(len(position) + 1, np.int64)
     indptr[middle + 1 :] = ways
-    return SimpleNamespace(position=position, indptr=indptr, target=middle + 1 + np.arange(ways))
+    target = middle + 1 + np.arange(ways)
+    return SimpleNamespace(position=position, indptr=indptr, targets=lambda edges: target[edges])
 
 
 @pytest.mark.parametrize("step", [50.0, 200.0])

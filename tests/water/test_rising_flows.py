@@ -11,6 +11,7 @@ from glider_stream.base.errors import InputError
 from glider_stream.evaluation.baselines import straight
 from glider_stream.evaluation.level_set import bound
 from glider_stream.kernels.flow import (
+    Grid,
     Rising,
     RisingGrid,
     RisingOceanGrid,
@@ -24,7 +25,7 @@ from glider_stream.scenario import read_scenario
 from glider_stream.search.path import Leg, Path, load_path
 from glider_stream.water.analytic import Abc, InternalWave, Rolls, Uniform, Upwelling
 from glider_stream.water.inspect import is_steady, require_level
-from glider_stream.water.sampled import sample_flow, sampling_error
+from glider_stream.water.sampled import level_part, sample_flow, sampling_error
 
 DEPTHS = (-300.0, 0.0)
 SIDES = (-500.0, 500.0)
@@ -86,6 +87,18 @@ def test_a_flow_without_one_has_no_vertical_part():
     assert not rises(flow)
     assert max_rise(flow) == 0.0
     assert current(flow, 1.0, 2.0, -3.0, 4.0) == (0.3, -0.2, 0.0)
+
+
+def test_a_grid_without_its_vertical_part_has_the_same_u_and_v():
+    box = (-400.0, 400.0)
+    grid = sample_flow(FLOWS["cells"].kernel(DEPTHS), (40.0, 40.0, 30.0), box, box, DEPTHS)
+    level = level_part(grid)
+    assert type(level) is Grid
+    for x, y, z, _ in np.clip(scattered(40), -380.0, 380.0):
+        assert velocity(level, x, y, min(z, 0.0), 0.0) == velocity(grid, x, y, min(z, 0.0), 0.0)
+    assert level.level_carry[-1] == pytest.approx(0.1 * 300.0, rel=0.5)
+    assert level_part(level) is level
+    assert level_part(FLOWS["cells"].kernel(DEPTHS)) is None
 
 
 def test_a_grid_holds_the_vertical_part_too():

@@ -9,15 +9,17 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.settings import require
-from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid
+from ...kernels.flow import Flow, OceanGrid, RisingOceanGrid, max_rise
 from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
-from ...water.ocean import OceanFlow
+from ...water.domain import GeographicDomain
+from ...water.inspect import flow_sha256
+from ...water.ocean import OceanFlow, read_members
 from ...water.ocean.ensemble import member_labels
 from ..orders import is_up
 from ..settings import Mission
-from ..world import Worlds
+from ..world import Worlds, check_ends, check_known
 
 MOST_MEMBERS = 10_000
 KEPT = 64
@@ -87,16 +89,16 @@ def drawn(mission: Mission, count: int, first: int = 0) -> Ensemble:
 def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     """Return the members of a file, or one of each of several files; the forecast is their mean.
 
-    InputError unless the members have the same points and times.
+    InputError unless the members have the same points and times, and no two the same currents.
     """
     scenarios = _scenarios(mission.scenario, files)
     problems = [_timed(scenario.problem()) for scenario in scenarios]
+    _check_each_once(files, [flow_sha256(problem.evaluator.flow) for problem in problems])
+    for problem in problems:
+        check_known(problem, mission, "members' current")
+    check_ends(problems[0])
     mean = _mean([problem.evaluator.flow for problem in problems])
     forecast = replace(problems[0], evaluator=replace(problems[0].evaluator, flow=mean))
-    until = forecast.departure + mission.arrival.longest
-    known = forecast.evaluator.flow.extent
-    why = f"`arrival.longest_hours` = {mission.arrival.longest_hours:g} reaches beyond the times of the members"
-    require(until <= known.t_hi, f"{why}, which end {(known.t_hi - forecast.departure) / 3600:.3g} h later")
     names = ", ".join(Path(file).name for file in files[:3]) + (", ..." if len(files) > 3 else "")
     numbers = tuple(range(len(problems)))
     return Ensemble(
@@ -106,6 +108,17 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
         f"{len(problems)} members of {names}; the forecast is their mean",
         members=dict(zip(numbers, problems, strict=True)),
     )
+
+
+def _check_each_once(files: Sequence[str | Path], digests: Sequence[str]) -> None:
+    """Raise InputError if two members hold the same currents: they would count twice."""
+    each_its_file = len(files) == len(digests)
+    seen: dict[str, str] = {}
+    for n, digest in enumerate(digests):
+        name = Path(files[n]).name if each_its_file else f"number {n} of {Path(files[0]).name}"
+        cure = "leave one of them out"
+        require(digest not in seen, f"members {seen.get(digest)} and {name} hold the same currents; {cure}")
+        seen[digest] = name
 
 
 def _mean(flows: Sequence[Flow]) -> OceanGrid | RisingOceanGrid:
@@ -119,7 +132,11 @@ def _mean(flows: Sequence[Flow]) -> OceanGrid | RisingOceanGrid:
         require(alike, f"members 0 and {n} have different points or times, so they have no mean; cut them alike")
         total += grid.values
     fastest = max(grid.extent.max_speed for grid in grids)
-    return first._replace(values=total / len(grids), extent=first.extent._replace(max_speed=fastest))
+    values, extent = total / len(grids), first.extent._replace(max_speed=fastest)
+    if isinstance(first, RisingOceanGrid):
+        # a bound as that of the speed: the mean may rise faster than the first member
+        return first._replace(values=values, extent=extent, max_rise=max(max_rise(grid) for grid in grids))
+    return first._replace(values=values, extent=extent)
 
 
 def first_member(files: Sequence[str | Path]) -> list[str]:
@@ -140,8 +157,16 @@ def _scenarios(scenario: Scenario, files: Sequence[str | Path]) -> list[Scenario
     if labels:
         flows = [replace(flow, file=names, member=label) for label in labels]
     else:
+        _check_alike(scenario, flow, names)
         flows = [replace(flow, file=(name,), member=None) for name in names]
     return [replace(scenario, flow=flow) for flow in flows]
+
+
+def _check_alike(scenario: Scenario, flow: OceanFlow, files: Sequence[str]) -> None:
+    """Raise InputError unless files with a member each have the same times: flows of one time do not keep it."""
+    domain = scenario.domain
+    assert isinstance(domain, GeographicDomain)
+    read_members(files, flow.names, lon=domain.lon, lat=domain.lat, depth=domain.depth)
 
 
 def _timed(problem: Problem) -> Problem:
