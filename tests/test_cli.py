@@ -123,7 +123,7 @@ def test_stopping_shows_no_traceback(capsys, monkeypatch, file):
     def stop(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("glider_stream.planner.info", stop)
+    monkeypatch.setattr("glider_stream.opened.open", stop)
     said = command(capsys, "info", file)
     # click ends the line of the ^C
     assert (said.code, said.out, said.err.lstrip()) == (130, "", "glider-stream: stopped\n")

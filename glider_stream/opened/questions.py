@@ -334,7 +334,12 @@ class OpenedRoadmap(OpenedScenario):
         return density_of(self._one, float(polar(self.scenario.glider).best_angle.max()))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the table that `info --json` prints."""
+        """Return the table that `info --json` prints.
+
+        Examples:
+            >>> road.as_dict()["nodes"]
+            77
+        """
         return self._told.as_dict()
 
     @property

@@ -27,7 +27,7 @@ from .canvas import (
     when_text,
 )
 from .fronts import Fronts, draw_fronts
-from .scene import SEABED, draw_current, draw_ends, draw_scale, draw_waypoints
+from .scene import KEY_PAD, SEABED, draw_current, draw_ends, draw_scale, draw_waypoints
 from .seabed import sample_bottom
 from .water import Frame, checked_depths, frame_of, passing
 
@@ -95,7 +95,7 @@ def plot_chart(
         when = PASSING if path.clock_runs else when_text(is_steady(flow), problem.departure, problem.departs)
         # on a line of its own: a long title would run into the next panel's
         every = "" if fronts is None else f",\nand what is reached every {fronts[1]:g} h{fronts[0].ways}"
-        ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}")
+        ax.set_title(f"(a) The route over the current at {depth:.4g} m{when}{every}", pad=KEY_PAD)
         ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
         line = _draw_route(ax, frame, rows, stops, clock)
         draw_waypoints(ax, frame, stops)

@@ -21,6 +21,8 @@ MAX_NODES = 4000
 HEIGHT = 0.55  # of a box in space, to its longer side
 LAND, SEABED = "#8c8c8c", "#cfcfcf"
 COASTLINE = 1.2  # points
+KEY_PAD = 18.0
+"""A title this far above its map [points] leaves room for the key of the arrows."""
 MOST_WAYPOINTS = 14
 """So many numbers of waypoints are drawn on a map; more would hide the route."""
 
@@ -64,7 +66,8 @@ def draw_current(
     """Draw the current at a depth [m] and a time t [s] (one, or one for each place); return the image.
 
     Colours are speeds, arrows are directions. `pale` is the share of white in the colours, `arrows` the number of
-    arrows along the longer side. With `key` an arrow with its speed stands in the lower right corner.
+    arrows along the longer side. With `key` an arrow with its speed stands above the right corner: the title
+    then needs a `pad` of KEY_PAD.
     """
 
     def current(count: int) -> tuple[Array, Array, Array, Array]:
@@ -80,8 +83,6 @@ def draw_current(
     extent = (ends[0], ends[1], ends[2], ends[3])
     image = ax.imshow(np.hypot(u, v), cmap=colour, vmin=0.0, origin="lower", extent=extent)
     x, y, u, v = current(arrows)
-    if key:  # the key's own arrow must not lie among others
-        u[(x > ends[1] - 0.3 * (ends[1] - ends[0])) & (y < ends[2] + 0.08 * (ends[3] - ends[2]))] = np.nan
     speed = np.hypot(u, v)
     # lengths grow with the square root, so that slow water remains readable beside fast water
     length = 1.0 / np.sqrt(np.maximum(speed * np.nanmax(speed, initial=1e-12), 1e-12))
@@ -96,7 +97,7 @@ def draw_current(
         shown = round_below(0.7 * fastest)
         put = {"labelpos": "W", "coordinates": "axes", "color": INK, "alpha": 1.0}
         put |= {"fontproperties": {"size": 8}, "zorder": 8}
-        named = ax.quiverkey(drawn, 0.95, 0.045, float(np.sqrt(shown / fastest)), f"{shown:g} m/s", **put)
+        named = ax.quiverkey(drawn, 0.95, 1.025, float(np.sqrt(shown / fastest)), f"{shown:g} m/s", **put)
         named.text.set_path_effects(halo())
     ax.set(xlim=ends[:2], ylim=ends[2:], aspect="equal")
     ax.locator_params(nbins=5, steps=[1, 2, 5, 10])

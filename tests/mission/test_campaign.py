@@ -104,7 +104,7 @@ def test_a_stopped_campaign_goes_on(folder, alone, tmp_path):
     again = simulate(small(folder), RUNS, keep=keep, progress=seen.append)
     assert [progress.done for progress in seen] == [2, 3]
     same(alone, again)
-    with pytest.raises(InputError, match="keeps the progress of another campaign, whose mission differ"):
+    with pytest.raises(InputError, match="keeps the progress of another campaign, whose mission, waters differ"):
         simulate(small(folder, {"random.seed": 8}), RUNS, keep=keep)
 
 
