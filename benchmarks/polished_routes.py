@@ -5,7 +5,7 @@
 each run over a scenario that --write makes:
 
     python benchmarks/polished_routes.py --write fields
-    hj/bin/python benchmarks/level_set.py fields/0.toml --grid 51,51,31 --grid 101,101,61 -o 0.json
+    hj/bin/python benchmarks/level_set.py fields/0.toml --grid 51,51,31 --grid 101,101,61 --tau 40 -o 0.json
 
 and kept, by seed, in records/level_set_fields.json: the value of the finest grid, the estimate of its error, and
 the travel time of a path of 80 controls that arrives: what can be had lies between the two.
