@@ -66,19 +66,10 @@ def stacked(name: str, parts: list[Part]) -> Part:
 def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
     """Return the currents of all parts: in the order of time, u and v on one grid, toward east and north."""
     name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
-    both = []
-    for component, toward in (("u", "east"), ("v", "north")):
-        matching = [part for part in parts if part.component == component]
-        require(len(matching) > 0, f"{name} holds no current toward {toward}; also name the file that does")
-        both.append(stacked(name, matching))
-    east, north = both
-    require(
-        _same(east.times, north.times),
-        f"{name}: east and north currents are given at different times; give both at the same times",
-    )
+    east, north = _east_and_north(name, parts)
     moments = stamped(name, east.times, names)
     levels = _levels_of_both(name, east, north)
-    notes = list(dict.fromkeys(note for part in both for note in part.notes))
+    notes = list(dict.fromkeys(note for part in (east, north) for note in part.notes))
     grid, u, v, deeper, more = _together(name, east, north, names)
     notes += more
 
@@ -101,12 +92,7 @@ def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
             f"{100 * gaps / ever.sum():.1f} % of the wet points have gaps in time; plans keep out of these"
         )
     surface = levels.depth is None or check_hold(name, names.hold, levels)
-    if levels.depth is None:
-        notes.append("the file has no depth: its current is taken as the surface's and held at all depths")
-    elif surface:
-        notes.append(f"its one level, at {levels.depth[0]:g} m, is held at all depths, as you say")
-    if moments is None or moments.size == 1:
-        notes.append("a single time: the current is taken as steady")
+    notes += _held(levels, moments, surface)
     seabed, mismatch = _seabed(ever, deeper, levels, depth, surface)
     notes += mismatch
     merged = {key: what for part in (north, east) for key, what in part.took.items()}
@@ -127,6 +113,33 @@ def joined(paths: list[Path], parts: list[Part], names: Names) -> OceanFile:
         np.array([np.inf]) if levels.lower is None or surface else levels.lower,
         0.0 if surface else levels.top,
     )
+
+
+def _east_and_north(name: str, parts: list[Part]) -> tuple[Part, Part]:
+    """Return the currents toward east and toward north, each of all its parts; their times are the same."""
+    both = []
+    for component, toward in (("u", "east"), ("v", "north")):
+        matching = [part for part in parts if part.component == component]
+        require(len(matching) > 0, f"{name} holds no current toward {toward}; also name the file that does")
+        both.append(stacked(name, matching))
+    east, north = both
+    require(
+        _same(east.times, north.times),
+        f"{name}: east and north currents are given at different times; give both at the same times",
+    )
+    return east, north
+
+
+def _held(levels: Levels, moments: Times | None, surface: bool) -> list[str]:
+    """Return notes on currents that are held at all depths, or at all times."""
+    notes = []
+    if levels.depth is None:
+        notes.append("the file has no depth: its current is taken as the surface's and held at all depths")
+    elif surface:
+        notes.append(f"its one level, at {levels.depth[0]:g} m, is held at all depths, as you say")
+    if moments is None or moments.size == 1:
+        notes.append("a single time: the current is taken as steady")
+    return notes
 
 
 def _assumed(

@@ -122,7 +122,24 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
     if standard == "ocean_sigma_coordinate":
         low, high = _ends(name, variable, s, s)
         return SigmaLevels("sigma", dim, s, s, 0.0, h, zeta, _with_range(description, low, high), low, high)
-    transform = number("", "Vtransform", "vtransform", "VertCoordType")
+    form = _form(subject, standard, number("", "Vtransform", "vtransform", "VertCoordType"))
+    stretch, critical = term("C", *STRETCHES[dim == "s_w"]), number("depth_c", "hc", "Tcline")
+    stretch = _among_attributes(data, dim, variable, "Cs_r", "Cs_w") if stretch is None else stretch
+    lacks = [what for what, term_found in (("Cs_r", stretch), ("hc", critical)) if term_found is None]
+    require(not lacks, f"{subject}, but the file holds no {listing(lacks)}; add the grid file that does")
+    assert stretch is not None
+    assert critical is not None
+    c = np.asarray(stretch.values, np.float64)
+    require(
+        c.shape == s.shape,
+        f"{subject}, but `{stretch.name}` has {c.size} values for {s.size} levels; mend the file",
+    )
+    low, high = _ends(name, variable, s, c)
+    return SigmaLevels(form, dim, s, c, critical, h, zeta, _with_range(description, low, high), low, high)
+
+
+def _form(subject: str, standard: str, transform: float | None) -> str:
+    """Return "g1" or "g2", the form of s-levels, by their standard name or by the file's `Vtransform`."""
     if standard not in ("ocean_s_coordinate_g1", "ocean_s_coordinate_g2"):
         if standard and standard != "ocean_s_coordinate":
             raise InputError(
@@ -137,21 +154,7 @@ def sigma_levels(name: str, data: Any, variable: Any, dim: str) -> SigmaLevels:
         transform in (None, float(standard[-1])),
         f"{subject} of the form {standard!r}, but the file says `Vtransform` = {transform}: mend one of them",
     )
-    stretch, critical = term("C", *STRETCHES[dim == "s_w"]), number("depth_c", "hc", "Tcline")
-    stretch = _among_attributes(data, dim, variable, "Cs_r", "Cs_w") if stretch is None else stretch
-    lacks = [what for what, term_found in (("Cs_r", stretch), ("hc", critical)) if term_found is None]
-    require(not lacks, f"{subject}, but the file holds no {listing(lacks)}; add the grid file that does")
-    assert stretch is not None
-    assert critical is not None
-    c = np.asarray(stretch.values, np.float64)
-    require(
-        c.shape == s.shape,
-        f"{subject}, but `{stretch.name}` has {c.size} values for {s.size} levels; mend the file",
-    )
-    low, high = _ends(name, variable, s, c)
-    return SigmaLevels(
-        standard[-2:], dim, s, c, critical, h, zeta, _with_range(description, low, high), low, high
-    )
+    return standard[-2:]
 
 
 def _with_range(description: str, low: tuple[float, float], high: tuple[float, float]) -> str:
