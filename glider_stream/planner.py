@@ -474,6 +474,8 @@ def bound(
 ) -> "Bound":
     """Find the least time that a route of a scenario can take, by a level set, with its error.
 
+    `scenario` may also be the name of a roadmap (.h5) or of a plan (.json): that which it was made with.
+
     `nodes` along the longest side of the finer grid; in 2 `dimensions`, the mean current of a yo's depths, or 3;
     None chooses 2 for long routes. `any_depth`: in 2 dimensions, the current of whichever depth is best, which is
     a bound where the mean is an estimate.
@@ -485,8 +487,9 @@ def bound(
     """
     from .evaluation.level_set import bound
 
-    resolved = scenario if isinstance(scenario, Scenario) else read_scenario(scenario, overrides)
-    return bound(resolved.problem(), dimensions, nodes, progress, any_depth)
+    made = isinstance(scenario, str | File) and File(scenario).suffix in (".h5", ".json")
+    opened = open_either(scenario, overrides) if made else open_scenario(scenario, overrides)
+    return bound(opened.problem, dimensions, nodes, progress, any_depth)
 
 
 def table(roadmap: AnyRoadmap, starts: Sequence[Point], goals: Sequence[Point]) -> Array:

@@ -31,7 +31,7 @@ import problems
 import table
 from record import keep, machine
 
-LONGEST = 3600.0
+LONGEST = 900.0
 """A peer that has not answered after this time [s] has failed."""
 
 

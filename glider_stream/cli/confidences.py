@@ -66,13 +66,13 @@ def confidence(
     for note in notes:
         say(f"note: {note}", error=True)
     path = answer.path if as_card else None
+    if as_json and path is None:
+        show_json(answer.as_dict())
+    elif not as_json:
+        say(answer, error=not answer.found)
     if path is not None:
         from ..pilot.card import card
 
         show(card(path, answer.ensemble.forecast), as_json)
-    elif as_json:
-        show_json(answer.as_dict())
-    else:
-        say(answer, error=not answer.found)
     if not answer.found:
         sys.exit(1)

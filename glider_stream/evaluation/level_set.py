@@ -90,12 +90,16 @@ class Bound:
         }
 
     def __str__(self) -> str:
-        where = "in all depths" if self.sound else "in the mean current of a yo's depths, an estimate"
         grid = " x ".join(f"{step:,.0f}" for step in self.spacing)
+        found = f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s" + (
+            f"; {STILL}" if self.frozen else ""
+        )
+        if self.sound:
+            return f"no route takes less than {span(self.least)}: a level set in all depths arrives after {found}"
         return (
-            f"no route takes less than {span(self.least)}: a level set {where}, arrives after "
-            f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s"
-            + (f"; {STILL}" if self.frozen else "")
+            f"an estimate of the least time, {span(self.least)}, no bound: a level set in the mean current of a "
+            f"yo's depths arrives after {found}. A route that stays in some of the depths may take less; "
+            "--any-depth gives a bound"
         )
 
 

@@ -340,6 +340,7 @@ def export_path(
     notes = skipped(path, _radius(form, chosen)) if form in RADII else []
     if form == ".ma":
         notes += slocum.altitude_notes(path, place.name)
+        notes += slocum.turn_notes(path, place.name)
         notes += slocum.clear_leftovers(place.parent, place.name, list(texts))
     for note in notes:
         say(note)

@@ -6,12 +6,13 @@ leg. A vehicle with `u_use_current_correction` steers by waypoints, not by our h
 
 import math
 import re
+from itertools import pairwise
 from pathlib import Path as File
 
 import numpy as np
 
 from ..base.settings import require
-from ..search.path import FROZEN, Path
+from ..search.path import FROZEN, SURFACE, Path
 from ..water.frame import wrapped
 from .slocum_files import (
     LEAST_DEPTH,
@@ -28,6 +29,8 @@ RADIUS = 500.0
 NAME = re.compile(r"goto_l(\d\d)\.ma")
 SERIES = re.compile(r"# written by glider-stream: list (\d+) of the route that begins in (goto_l\d\d\.ma)")
 """The comment that marks our own lists."""
+SAME_DEPTH = 10.0
+"""Turns of a plan this near to those of the yo file [m] are flown as planned."""
 LEAST_ALTITUDE = 5.0
 """The vehicle turns at least this far above the bottom [m], whatever the plan keeps: masterdata's value."""
 STEEPEST = math.radians(26.0)
@@ -147,6 +150,25 @@ def altitude_notes(path: Path, name: str) -> list[str]:
     clearance = None if path.origin is None else path.origin.clearance
     keeps = clearance is not None and height >= clearance
     return [] if keeps else [f"yo{list_number(name):02}.ma has d_target_altitude {height:g} m: {reason}"]
+
+
+def turn_notes(path: Path, name: str) -> list[str]:
+    """Return a sentence if the plan's yos are not those of the yo file beside the list `name`: all alike."""
+    depth = [-float(z) for leg in path.legs for z in (leg.start[2], leg.end[2])]
+    deepest, shallow = max(depth), max(LEAST_DEPTH, min(depth))
+    off = []
+    for leg, following in pairwise(path.legs):
+        here, dives = -float(leg.end[2]), leg.glide_angle < 0
+        if dives != (following.glide_angle < 0) and (dives or here > SURFACE):
+            off.append(abs(here - (deepest if dives else shallow)))
+    other = sum(distance > SAME_DEPTH for distance in off)
+    if other == 0:
+        return []
+    return [
+        f"turns of the plan ({other} of them) lie up to {max(off):,.0f} m from those of yo{list_number(name):02}.ma, "
+        f"which makes all yos alike, from {shallow:g} to {deepest:,.0f} m: the vehicle will not fly this plan; "
+        "for equal yos, plan without --polish"
+    ]
 
 
 def _range(angles: list[float]) -> str:

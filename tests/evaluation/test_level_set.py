@@ -103,7 +103,9 @@ def test_it_says_what_it_is():
     assert flat.as_dict()["kind"] == "estimate"
     assert deep.as_dict()["kind"] == "bound"
     assert flat.least == 3564.0
-    assert str(flat).startswith("no route takes less than 3,564 s (0.99 h): a level set in the mean current")
+    assert str(flat).startswith(
+        "an estimate of the least time, 3,564 s (0.99 h), no bound: a level set in the mean current"
+    )
     assert "50 x 40 x 30 m" in str(deep)
 
 

@@ -161,6 +161,17 @@ def test_the_yo_turns_at_the_plans_clearance_or_says_that_it_does_not(tmp_path, 
     assert len(notes) == (0 if said is None else 1)
 
 
+def test_a_plan_whose_yos_are_not_alike_is_told(tmp_path):
+    # the first yo turns at 200 m; then down to 200 m again, but up to 120 m only
+    legs = list(route().legs)
+    turn = next(n for n in range(len(legs) - 1) if legs[n].glide_angle > 0 and legs[n + 1].glide_angle < 0)
+    end = np.array([*legs[turn].end[:2], -120.0])
+    legs[turn : turn + 2] = replace(legs[turn], end=end), replace(legs[turn + 1], start=end)
+    notes = []
+    export_path(replace(with_clearance(50.0), legs=tuple(legs)), tmp_path / "goto_l10.ma", notes.append)
+    assert [note for note in notes if "turns of the plan (1 of them) lie up to 117 m from those of yo10.ma" in note]
+
+
 def test_targets_say_which_depths_they_cannot_hold(tmp_path):
     export_path(with_clearance(50.0), tmp_path / "targets")
     text = (tmp_path / "targets").read_text()
