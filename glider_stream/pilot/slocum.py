@@ -166,8 +166,8 @@ def turn_notes(path: Path, name: str) -> list[str]:
         return []
     return [
         f"turns of the plan ({other} of them) lie up to {max(off):,.0f} m from those of "
-        f"yo{list_number(name):02}.ma, which makes all yos alike, from {shallow:g} to {deepest:,.0f} m: the vehicle will not fly this plan; "
-        "for equal yos, plan without --polish"
+        f"yo{list_number(name):02}.ma, which makes all yos alike, from {shallow:g} to {deepest:,.0f} m: "
+        "the vehicle will not fly this plan; for equal yos, plan without --polish"
     ]
 
 
