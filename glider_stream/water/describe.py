@@ -137,7 +137,8 @@ class Description:
             where += "" if point.depth is None else f", {point.depth:g} m"
             where += "" if point.time is None else f", {point.time}"
             if point.u_east is None or point.v_north is None:
-                lines.append(f"  {where}: no water, or no data")
+                held = south <= point.lat <= north_end and (point.lon - west) % 360 <= east_end - west
+                lines.append(f"  {where}: " + ("no water, or no data" if held else "outside the file's extent"))
             else:
                 lines.append(f"  {where}: {point.u_east:+.5f} m/s east, {point.v_north:+.5f} m/s north")
         return "\n".join(lines)

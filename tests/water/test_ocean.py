@@ -610,11 +610,11 @@ def test_describe_says_what_was_taken_and_read(tmp_path):
         current(*PLACE[:3], 15.0), abs=TOLERANCE
     )
     assert table["points"][1]["u_east"] is table["points"][1]["v_north"] is None
+    assert f"  30, 60, 10 m, {PLACE[3]}: outside the file's extent" in str(told)
     for words in (
         "uo",
         "2023-02-27T00:00:00Z",
         "5 levels",
-        "no water",
         "m/s east",
         "stream value",
         "flat frame",
