@@ -2,7 +2,7 @@
 
 The flow is the seed box's, as wide as its nodes need to lie 56 m apart; legs are the fastest `limit` down and up.
 
-    python benchmarks/scale.py --nodes 1000000 --folder /tmp/scale -o benchmarks/records/scale.json
+    python benchmarks/scale.py --nodes 1000000 --folder scale -o benchmarks/records/scale.json
 """
 
 import math
