@@ -140,6 +140,7 @@ def main() -> None:
     parser.add_argument("--ionian", type=Path, metavar="CURRENTS.nc", help="the shipped Ionian scenario, too")
     parser.add_argument("--within", type=float, metavar="SHARE", help="refine too, until a round gains less")
     parser.add_argument("--only", choices=("fields", "suite"), help="these routes alone")
+    parser.add_argument("--threads", type=int, help="so many threads; all if not given")
     parser.add_argument("-o", "--output", type=Path, help="a JSON file to keep the result in")
     args = parser.parse_args()
     if args.write:
@@ -148,7 +149,7 @@ def main() -> None:
             (args.write / f"{seed}.toml").write_text(scenario_text(seed))
         return
     rows = []
-    with threads(None) as count:
+    with threads(args.threads) as count:
         fields = field_routes(args.within) if args.only != "suite" else ()
         suite = suite_routes(args.within) if args.only != "fields" else ()
         for row in chain(fields, suite, ionian_routes(args.ionian, args.within)):

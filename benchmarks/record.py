@@ -9,7 +9,7 @@ from typing import Any
 
 def machine(threads: int | None = None) -> str:
     """Return what machine this is, and on how many threads it works if that is told."""
-    on = "" if threads is None else f"{threads} threads, "
+    on = "" if threads is None else f"{threads} thread{'s' * (threads != 1)}, "
     return f"{platform.machine()}, {os.cpu_count()} cores, {on}Python {platform.python_version()}"
 
 

@@ -487,7 +487,7 @@ def bound(
     """
     from .evaluation.level_set import bound
 
-    made = isinstance(scenario, str | File) and File(scenario).suffix in (".h5", ".json")
+    made = is_plan(scenario) or (isinstance(scenario, str | File) and File(scenario).suffix.lower() == ".h5")
     opened = open_either(scenario, overrides) if made else open_scenario(scenario, overrides)
     return bound(opened.problem, dimensions, nodes, progress, any_depth)
 

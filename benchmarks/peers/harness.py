@@ -38,6 +38,13 @@ def answer(package: str, seconds: dict[str, Any], **found: Any) -> None:
     )
 
 
+def routes(package: str, travel_time: Callable[[str, int], float]) -> None:
+    """Time a planner of the job's scenario, with another seed in each run, and write its travel times [s]."""
+    seeds, found = iter(range(JOB["runs"] + 1)), list[float]()
+    _, seconds = timed(lambda: found.append(travel_time(JOB["scenario"], next(seeds))))
+    answer(package, seconds, routes_s=finite(found[1:]))
+
+
 def finite(times: list[float]) -> list[float | None]:
     """The travel times [s], None where there is no route."""
     return [time if np.isfinite(time) else None for time in times]

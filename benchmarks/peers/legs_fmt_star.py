@@ -1,18 +1,12 @@
 """FMT* on exact legs: another Sobol sequence of 1,000 places in each run."""
 
-from harness import JOB, answer, finite, timed
+from harness import routes
 
 from glider_stream.evaluation.fmt_star import fmt_star
 from glider_stream.scenario import read_scenario
 
 STEERING = ["steering.method=flow-map"]
-seeds, found = iter(range(JOB["runs"] + 1)), []
-
-
-def route():
-    problem = read_scenario(JOB["scenario"], STEERING).problem()
-    found.append(fmt_star(problem, 1000, next(seeds)).travel_time)
-
-
-_, seconds = timed(route)
-answer("glider-stream", seconds, routes_s=finite(found[1:]))
+routes(
+    "glider-stream",
+    lambda scenario, seed: fmt_star(read_scenario(scenario, STEERING).problem(), 1000, seed).travel_time,
+)

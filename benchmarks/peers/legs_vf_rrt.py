@@ -1,18 +1,12 @@
 """VF-RRT on exact legs, steps of 150 m: other random places in each run."""
 
-from harness import JOB, answer, finite, timed
+from harness import routes
 
 from glider_stream.evaluation.vector_field_rrt import vf_rrt
 from glider_stream.scenario import read_scenario
 
 STEERING = ["steering.method=flow-map"]
-seeds, found = iter(range(JOB["runs"] + 1)), []
-
-
-def route():
-    problem = read_scenario(JOB["scenario"], STEERING).problem()
-    found.append(vf_rrt(problem, 150.0, seed=next(seeds)).travel_time)
-
-
-_, seconds = timed(route)
-answer("glider-stream", seconds, routes_s=finite(found[1:]))
+routes(
+    "glider-stream",
+    lambda scenario, seed: vf_rrt(read_scenario(scenario, STEERING).problem(), 150.0, seed=seed).travel_time,
+)

@@ -26,6 +26,7 @@ class Vehicle(hj.dynamics.Dynamics):
     def __init__(self):
         pass
 
+    # the library asks for both, and never calls them, since the Hamiltonian is given
     def __call__(self, state, control, disturbance, time):
         raise NotImplementedError
 

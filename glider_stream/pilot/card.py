@@ -75,8 +75,9 @@ class Card:
         }
 
     def __str__(self) -> str:
-        head = "leg   hours  over ground             along   across     to goal    fastest   arrives"
-        lines = [head, *(self._line(f"{n:3}", row) for n, row in enumerate(self.legs, 1))]
+        above = "                                     current, m/s                    greatest"
+        head = "leg   hours  over ground             along   across     to goal    current   arrives"
+        lines = [above, head, *(self._line(f"{n:3}", row) for n, row in enumerate(self.legs, 1))]
         lines.append(self._line("all", self.whole))
         if self.under:
             times = "" if len(self.under) == 1 else f" {len(self.under)} times, {min(self.under) / 3600:.2f} to"

@@ -9,7 +9,7 @@ from ..base.arrays import Array
 from ..roadmap.problem import Problem
 from ..water.inspect import is_steady
 from .canvas import GREY, INK, frozen, new_figure, styled, time_unit, when_text
-from .scene import draw_current, draw_ends
+from .scene import draw_current, draw_ends, legend_below, map_height
 from .water import Frame, frame_of
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ LOOKS: dict[str, tuple[str, Any]] = {
 """Colour and line of each policy (Okabe, Ito 2008): they differ in print and for people who see few colours."""
 FEW = 5
 """With fewer runs each is a mark, since shares and boxes of a few runs say nothing."""
-MAP_WIDTH, MAP_HEIGHTS = 5.2, (1.0, 4.4)
-"""The width of a map, and the least and greatest height that it gets [inches]."""
+MAP_WIDTH = 5.2
+"""The width of a map [inches]."""
 MOST_TRACKS = 60
 """So many tracks of each policy are drawn; more would hide the current."""
 
@@ -70,11 +70,10 @@ def plot_campaign(problem: Problem, runs: Runs, radius: float, depth: float, tit
         points = [run.track[:, 1:] for flown in runs.values() for run in flown[:MOST_TRACKS]]
         frame = frame_of(problem, np.vstack(points))
         count = max(len(flown) for flown in runs.values())
-        high = (frame.y[1] - frame.y[0]) / (frame.x[1] - frame.x[0])
-        tall = float(np.clip(MAP_WIDTH * high, *MAP_HEIGHTS)) + 1.0
+        high = map_height(frame, MAP_WIDTH)
         title = f"{title}: {count:,} run{'s' * (count != 1)} of each policy"
-        figure = new_figure(13.0, tall + 3.8, title)
-        grid = figure.add_gridspec(2, 2, height_ratios=(tall, 3.4))
+        figure = new_figure(13.0, high + 4.8, title)
+        grid = figure.add_gridspec(2, 2, height_ratios=(high + 1.0, 3.4))
         flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
         when = when_text(is_steady(flow), problem.departure, problem.departs)
         maps = [figure.add_subplot(grid[0, n]) for n in range(2)]
@@ -82,7 +81,7 @@ def plot_campaign(problem: Problem, runs: Runs, radius: float, depth: float, tit
             image = draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.45)
             ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
             _draw_goal(ax, frame, problem.goal, radius)
-        look: dict[str, Any] = {"aspect": 30 * min(1.0, high), "pad": 0.02}
+        look: dict[str, Any] = {"aspect": 30 * high / MAP_WIDTH, "pad": 0.02}
         figure.colorbar(image, ax=maps, label="True current (m/s)", **look)
         _draw_tracks(maps[0], frame, runs)
         maps[0].set_title(f"(a) Tracks over the true current at {depth:.4g} m{when}")
@@ -113,13 +112,7 @@ def _draw_tracks(ax: Any, frame: Frame, runs: Runs) -> None:
             line = frame.scaled(run.track[:, 1:])
             ax.plot(*line[:, :2].T, linewidth=1.2, alpha=alpha, zorder=5, **look)
         ax.plot([], [], linewidth=2.0, label=policy, **look)
-    _legend_below(ax, 5)
-
-
-def _legend_below(ax: Any, columns: int) -> None:
-    """Put the legend of a map below the label of its axis, however flat the map is."""
-    look: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 4.6}
-    ax.legend(ncols=columns, frameon=False, fontsize=8, **look)
+    legend_below(ax, 5)
 
 
 def _draw_plan(ax: Any, frame: Frame, runs: Runs) -> None:
@@ -136,7 +129,7 @@ def _draw_plan(ax: Any, frame: Frame, runs: Runs) -> None:
         ax.plot(*line[:, :2].T, linewidth=1.8, zorder=6, **look)
     ax.plot([], [], color=INK, linestyle=(0, (4, 2)), label="first plan")
     ax.plot([], [], color=colour, linestyle=style, label="flown")
-    _legend_below(ax, 2)
+    legend_below(ax, 2)
     ax.set_title(f"(b) Plan and flown: run 0, {policy}")
 
 

@@ -9,7 +9,7 @@ from ..base.arrays import Array, Bools
 from ..roadmap.problem import Problem
 from ..water.inspect import is_steady
 from .canvas import GREY, INK, frozen, new_figure, styled, time_unit, when_text
-from .scene import draw_current, draw_ends
+from .scene import KEY_PAD, draw_current, draw_ends, legend_below, map_height
 from .water import Frame, frame_of
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def plot_confidence(
     with styled():
         frame = frame_of(problem, np.vstack([track[:, 1:] for track in tracks]))
         panels = 2 if reach is None else 3
-        figure = new_figure(6.6 * panels, 5.6, title)
+        figure = new_figure(6.6 * panels, max(map_height(frame, 5.6), 2.4) + 1.7, title)
         axes = figure.subplots(1, panels)
         _draw_tracks(axes[0], problem, frame, tracks, np.isfinite(times[0][1]), radius)
         _draw_arrivals(axes[1], times, others)
@@ -58,7 +58,7 @@ def _draw_tracks(
 
     flow, terrain = problem.evaluator.flow, problem.evaluator.terrain
     depth = float(-0.5 * (problem.lo[2] + problem.hi[2]))
-    draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.6)
+    draw_current(ax, flow, terrain, frame, depth, problem.departure, pale=0.6, key=True)
     assert problem.goal is not None
     assert problem.start is not None
     for track, there in list(zip(tracks, arrived, strict=True))[:MOST_TRACKS]:
@@ -73,10 +73,10 @@ def _draw_tracks(
     draw_ends(ax, frame.scaled(np.stack([problem.start, problem.goal]))[:, :2], 0.7)
     ax.plot([], [], color=ARRIVES, label=f"arrives ({int(arrived.sum())})")
     ax.plot([], [], color=LOST, linestyle=(0, (4, 1)), label=f"does not ({int((~arrived).sum())})")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4, frameon=False, fontsize=8)
+    legend_below(ax, 4)
     when = when_text(is_steady(flow), problem.departure, problem.departs)
     ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
-    ax.set_title(f"(a) In all members; the forecast at {depth:.4g} m{when}")
+    ax.set_title(f"(a) In all members; the forecast at {depth:.4g} m{when}", pad=KEY_PAD)
 
 
 def _draw_arrivals(ax: Any, times: Times, others: Sequence[Array]) -> None:
@@ -89,7 +89,7 @@ def _draw_arrivals(ax: Any, times: Times, others: Sequence[Array]) -> None:
     ax.set(xlabel=f"Time since departure ({name})", ylabel="Arrived (% of members)", ylim=(-2, 104))
     ax.grid(color="#e6e6e6", linewidth=0.6)
     ax.set_title("(b) Who has arrived; grey: the other candidates" if others else "(b) Who has arrived")
-    ax.legend(frameon=False, fontsize=8, loc="lower right")
+    ax.legend(frameon=False, fontsize=8, loc="best")
 
 
 def _steps(time: Array, latest: float, unit: float) -> tuple[Array, Array]:

@@ -21,6 +21,8 @@ MAX_NODES = 4000
 HEIGHT = 0.55  # of a box in space, to its longer side
 LAND, SEABED = "#8c8c8c", "#cfcfcf"
 COASTLINE = 1.2  # points
+MAP_HEIGHTS = 1.0, 4.4
+"""The least and greatest height of a map between other panels [inches]."""
 KEY_PAD = 18.0
 """A title this far above its map [points] leaves room for the key of the arrows."""
 MOST_WAYPOINTS = 14
@@ -116,6 +118,18 @@ def round_below(value: float) -> float:
     """Return the greatest of 1, 2 and 5 times a power of ten that is not above a value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(k * power for k in (1.0, 2.0, 5.0) if k * power <= value * (1 + 1e-9)))
+
+
+def legend_below(ax: "Axes", columns: int) -> None:
+    """Put the legend of a map below the label of its axis, however flat the map is."""
+    look: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 4.6}
+    ax.legend(ncols=columns, frameon=False, fontsize=8, **look)
+
+
+def map_height(frame: Frame, width: float) -> float:
+    """Return the height of a map so wide [inches], within MAP_HEIGHTS."""
+    high = (frame.y[1] - frame.y[0]) / (frame.x[1] - frame.x[0])
+    return float(np.clip(width * high, *MAP_HEIGHTS))
 
 
 def draw_scale(ax: "Axes", frame: Frame) -> None:

@@ -14,7 +14,7 @@ from ...roadmap.problem import Problem
 from ...scenario import Scenario
 from ...vehicle.cost import TravelTime
 from ...water.domain import GeographicDomain
-from ...water.inspect import flow_sha256
+from ...water.inspect import flow_sha256, is_steady
 from ...water.ocean import OceanFlow, read_members
 from ...water.ocean.ensemble import member_labels
 from ..orders import is_up
@@ -93,6 +93,8 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     """
     scenarios = _scenarios(mission.scenario, files)
     problems = [_timed(scenario.problem()) for scenario in scenarios]
+    if len(files) == len(problems) and is_steady(problems[0].evaluator.flow):
+        _check_alike(mission.scenario, files)
     _check_each_once(files, [flow_sha256(problem.evaluator.flow) for problem in problems])
     for problem in problems:
         check_known(problem, mission, "members' current")
@@ -157,15 +159,15 @@ def _scenarios(scenario: Scenario, files: Sequence[str | Path]) -> list[Scenario
     if labels:
         flows = [replace(flow, file=names, member=label) for label in labels]
     else:
-        _check_alike(scenario, flow, names)
         flows = [replace(flow, file=(name,), member=None) for name in names]
     return [replace(scenario, flow=flow) for flow in flows]
 
 
-def _check_alike(scenario: Scenario, flow: OceanFlow, files: Sequence[str]) -> None:
-    """Raise InputError unless files with a member each have the same times: flows of one time do not keep it."""
-    domain = scenario.domain
+def _check_alike(scenario: Scenario, files: Sequence[str | Path]) -> None:
+    """Raise InputError unless files with one time each have the same: a flow of one time does not keep it."""
+    domain, flow = scenario.domain, scenario.flow
     assert isinstance(domain, GeographicDomain)
+    assert isinstance(flow, OceanFlow)
     read_members(files, flow.names, lon=domain.lon, lat=domain.lat, depth=domain.depth)
 
 
