@@ -596,7 +596,7 @@ def test_divergence_ratio_of_pure_fields(tmp_path):
 
 def test_describe_says_what_was_taken_and_read(tmp_path):
     path = written(tmp_path, dataset())
-    told = describe([path], at=[PLACE, (30.0, 60.0, 10.0, PLACE[3])])
+    told = describe([path], at=[PLACE, (30.0, 60.0, 10.0, PLACE[3]), (*PLACE[:2], 5000.0, PLACE[3])])
     table = json.loads(json.dumps(told.as_dict(), allow_nan=False))
     assert table["points"][0] | {"u_east": 0, "v_north": 0} == {
         "lon": 20.63,
@@ -615,6 +615,7 @@ def test_describe_says_what_was_taken_and_read(tmp_path):
         "uo",
         "2023-02-27T00:00:00Z",
         "5 levels",
+        "5000 m, 2023-02-27T15:00:00: no water, or no data",
         "m/s east",
         "stream value",
         "flat frame",
