@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .evaluation import bench as benchmarks
+    from .evaluation import level_set
     from .evaluation.level_set import Bound
     from .evaluation.suite import Report
     from .mission.campaign import Campaign
@@ -470,7 +471,7 @@ def bound(
     nodes: int | None = None,
     dimensions: int | None = None,
     any_depth: bool = False,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: "Callable[[level_set.Progress], None]" = lambda progress: None,
 ) -> "Bound":
     """Find the least time that a route of a scenario can take, by a level set, with its error.
 

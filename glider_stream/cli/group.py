@@ -1,9 +1,30 @@
 """The command that holds all others."""
 
+from typing import Any
+
 import click
 
+from ..base.terminal import say
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
+
+class Command(click.Command):
+    """A command that says when it has to compile kernels."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        from ..base.compiling import telling_of_compiling
+
+        with telling_of_compiling(lambda message: say(message, error=True)):
+            return super().invoke(ctx)
+
+
+class Group(click.Group):
+    """A group of such commands."""
+
+    command_class = Command
+
+
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
 @click.version_option(package_name="glider-stream")
 def cli() -> None:
     """Plan underwater glider routes in ocean currents."""

@@ -23,6 +23,7 @@ difference between two grids estimates the scheme's.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,22 @@ class Bound:
             f"an estimate of the least time, {span(self.least)}, no bound: a level set in the mean current of a "
             f"yo's depths arrives after {found}. A route that stays in some of the depths may take less; "
             "--any-depth gives a bound"
+        )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the front is on grid `number` of two, of a `shape`: at `done` [s] of about `total` [s]."""
+
+    done: float
+    total: float
+    number: int
+    shape: tuple[int, ...]
+
+    def __str__(self) -> str:
+        grid = " x ".join(map(str, self.shape))
+        return (
+            f"grid {self.number} of 2, {grid} nodes: the front at {self.done:,.0f} s of about {self.total:,.0f} s"
         )
 
 
@@ -262,8 +279,11 @@ class Front:
         place[: carried.size] += sign * began * carried
         return began, place
 
-    def arrival(self) -> float:
-        """When the far end is reached [s], as the module says; inf where that is never."""
+    def arrival(self, progress: Callable[[float, float], None] = lambda now, left: None) -> float:
+        """When the far end is reached [s], as the module says; inf where that is never.
+
+        `progress` is told after each step where the front is and what is about left [s].
+        """
         waters, tau = self.waters, self.waters.still_water_time(self.nodes - self.source).reshape(self.shape)
         values, now = np.hypot(tau, self.tau) - self.tau, self.began
         latest = LATEST * float(waters.still_water_time((waters.ends[1] - waters.ends[0])[None])[0])
@@ -280,7 +300,9 @@ class Front:
             now, before, left = now + ahead, left, self._left(values)
             if left <= self.tau:
                 touched = now - ahead * (self.tau - left) / max(before - left, 1e-12)
+                progress(touched, 0.0)
                 return float(touched)
+            progress(now, left)
         return math.inf
 
     def _current(self, since: float) -> list[Array]:
@@ -352,6 +374,12 @@ def _weno(a: Array, b: Array, c: Array, d: Array, e: Array) -> Array:
     return np.asarray(sum(w * part for w, part in zip(weight, parts, strict=True)) / sum(weight))
 
 
+def _tell(
+    progress: Callable[[Progress], None], number: int, shape: tuple[int, ...], now: float, left: float
+) -> None:
+    progress(Progress(now, now + left, number, shape))
+
+
 def dimensions_of(problem: Problem) -> int:
     """2 where a route at the fastest glide would have many legs, else 3."""
     if problem.start is None or problem.goal is None:
@@ -365,12 +393,13 @@ def bound(
     problem: Problem,
     dimensions: int | None = None,
     nodes: int | None = None,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Callable[[Progress], None] = lambda progress: None,
     any_depth: bool = False,
 ) -> Bound:
     """The least time from start to goal, by two grids, the finer with `nodes` along its longest side.
 
-    With `any_depth`, in two dimensions, the front takes the current of whichever depth is best.
+    With `any_depth`, in two dimensions, the front takes the current of whichever depth is best. `progress` is
+    told of every step.
 
     InputError where the front does not reach the goal: land, the sides or the current are in the way.
     """
@@ -386,10 +415,10 @@ def bound(
     waters = Waters(problem, size, any_depth)
     tau = CELLS * float((waters.hi - waters.lo).max()) / (finest - 1) / waters.fastest
     found = []
-    for count in (1 + (finest - 1) // 2, finest):
+    for number, count in enumerate((1 + (finest - 1) // 2, finest), 1):
         front = Front(waters, count, tau)
-        found.append(front.arrival())
-        progress(f"a grid of {' x '.join(map(str, front.shape))}: {found[-1]:,.0f} s")
+        told = partial(_tell, progress, number, front.shape)
+        found.append(front.arrival(told))
     cure = "take a wider domain, or more nodes"
     require(math.isfinite(found[-1]), f"no front reaches the goal in {LATEST:g} times the straight way; {cure}")
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]

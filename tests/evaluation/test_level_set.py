@@ -135,7 +135,8 @@ def test_what_cannot_be_bounded_is_refused(problem):
 
 def test_the_command_line_bounds(capsys, tmp_path):
     said = command(capsys, "bound", scenario_file(tmp_path), "--nodes", 21, "--json")
-    assert said.err.startswith("bound: a grid of ")
+    assert said.err.startswith("bound: grid 1 of 2, 11 x 11 x ")
+    assert "bound: grid 2 of 2, 21 x 21 x " in said.err
     found = strict_json(said.out)
     assert 0.0 < found["least_s"] <= found["time_s"]
     # no route of the roadmap is quicker
