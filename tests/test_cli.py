@@ -10,8 +10,7 @@ import pytest
 from helpers.small import command, executable, roadmap, scenario_file, strict_json
 from numba import njit
 
-from glider_stream.base import progress
-from glider_stream.base.compiling import COMPILING
+from glider_stream.base import compiling, progress
 from glider_stream.cli import cli
 from glider_stream.cli.group import Command
 from glider_stream.roadmap.store import read_roadmap, write_roadmap
@@ -151,13 +150,16 @@ def test_a_log_gets_a_line_now_and_then_and_at_the_end(capsys, monkeypatch):
     assert said.err.splitlines() == ["build: 1 of 10", "build: 3 of 10", "build: 10 of 10"]
 
 
-def test_a_command_says_once_that_it_compiles(capsys):
+def test_a_command_says_once_that_it_compiles(capsys, monkeypatch):
     def compile_two():
         for add in (lambda a: a + 1, lambda a: a + 2):
             njit(add)(1)
 
+    Command("small", callback=compile_two).main([], standalone_mode=False)
+    assert capsys.readouterr().err == ""  # there is a cache, and these are not kept in it: they are small
+    monkeypatch.setattr(compiling, "cache_folder", lambda: None)
     Command("compile", callback=compile_two).main([], standalone_mode=False)
-    assert capsys.readouterr() == ("", f"{COMPILING}\n")
+    assert capsys.readouterr() == ("", f"{compiling.COMPILING}\n")
     Command("nothing", callback=lambda: None).main([], standalone_mode=False)
     assert capsys.readouterr().err == ""
 

@@ -3,20 +3,27 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from numba.core.caching import NullCache
 from numba.core.event import Event, Listener, install_listener
+
+from ..kernels.cache import cache_folder
 
 COMPILING = "compiling kernels, once for each kind of current; this takes a minute or so"
 
 
 class _First(Listener):
-    """Tells of the first compilation alone: a kernel's own kernels are compiled within it."""
+    """Tells of the first compilation of an entry point: its own kernels are compiled within it.
+
+    A kernel that is not cached, though there is a cache, is no entry point: it is small, and compiled every time.
+    """
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
         self._told = False
 
     def on_start(self, event: Event) -> None:
-        if not self._told:
+        cached = not isinstance(event.data["dispatcher"]._cache, NullCache)
+        if not self._told and (cached or cache_folder() is None):
             self._told = True
             self._tell(COMPILING)
 

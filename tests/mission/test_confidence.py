@@ -282,6 +282,12 @@ def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
     )
     with pytest.raises(InputError, match=r"a\.nc and later\.nc have different times: .*; cut them alike"):
         from_files(read, [tmp_path / "a.nc", tmp_path / "later.nc"])
+    gone = doubled.copy(deep=True)
+    for name in ("uo", "vo"):
+        gone[name][:] = np.where(gone.longitude > 18.6, np.nan, gone[name])
+    gone.to_netcdf(tmp_path / "gone.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"in member gone\.nc, `goal` = .* or leave this member out"):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "gone.nc"])
     with pytest.raises(
         InputError, match=r"members a\.nc and a\.nc hold the same currents; leave one of them out"
     ):
