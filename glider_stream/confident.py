@@ -7,6 +7,7 @@ import numpy as np
 
 from .base.settings import require
 from .mission.confidence.answer import Confidence, confidence_of
+from .mission.confidence.candidates import FORECAST
 from .mission.confidence.ensemble import Ensemble, drawn, first_member, from_files
 from .mission.confidence.judged import Criterion
 from .mission.settings import Mission, read_mission
@@ -92,7 +93,7 @@ def _written(found: Confidence, outputs: Sequence[str | File]) -> list[str]:
     path = found.path
     if path is not None and outputs and found.best.candidate.member >= 0:
         name = found.best.candidate.name.partition(",")[0]
-        notes.append(f"the route is the fastest in {name}, and its file shows it as flown there")
+        notes.append(f"the route is the {name}, and its file shows it as flown there")
     if path is None and outputs:
         name = found.best.candidate.name
         return [f"the best, {name}, makes its orders on the way, so no route file is written"]
@@ -107,7 +108,10 @@ def _draw(found: Confidence, figure: str | File) -> None:
     from .plot.confidence import plot_confidence
 
     best, mission = found.best, found.ensemble.mission
-    shown = [best, *(each for each in found.flights if each.candidate.name in ("the forecast", "straight"))]
+    beside = [
+        next((e for e in found.flights if e.candidate.name.startswith(w)), None) for w in (FORECAST, "straight")
+    ]
+    shown = [best, *(each for each in beside if each is not None)]
     names = list({each.candidate.name: each.time for each in shown}.items())
     grey = [each.time for each in found.flights if each.candidate.name not in dict(names)]
     area = None if found.reach is None else (found.reach.place, found.reach.share, found.reach.by)

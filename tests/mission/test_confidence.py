@@ -129,10 +129,10 @@ def test_without_errors_a_route_arrives_when_it_says(folder):
     best = answer.best
     assert best.arrived().value == 1.0
     assert best.time == pytest.approx([answer.path.travel_time] * 2, rel=0.01)
-    assert best.candidate.name == "the forecast"
+    assert best.candidate.name == "fastest in the forecast, as trims"
     names = [each.candidate.name for each in answer.flights]
     assert not [
-        name for name in names if name.startswith("member") and "waypoints" not in name
+        name for name in names if name.startswith("fastest in member") and "waypoints" not in name
     ]  # the same orders
     assert set(answer.reach.share) == {0.0, 1.0}  # by that time; members are alike
     assert answer.reach.by == answer.criterion.promised(best.time)
@@ -161,6 +161,7 @@ def test_the_command_chooses_and_looks_at_a_route(folder, capsys, monkeypatch):
     assert chosen["arrival_quantiles_s"]["50%"] < table["promised_by_s"] < LIMIT
     assert (folder / "c.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads((folder / "route.json").read_text())["confidence"]["members"] == 4
+    assert json.loads((folder / "route.json").read_text())["confidence"]["planned_in"] in table["chosen"]["name"]
     assert load_path("route.json").origin is not None
     said = command(
         capsys, "confidence", "small-mission.toml", "route.json", "--draws", "2", "--best", "by", "--by", "0.5"
