@@ -598,9 +598,9 @@ def describe(
         >>> description = planner.describe("currents.nc", at=[(18.5, 38.0, 100.0, None)])
         >>> print(description)  # doctest: +ELLIPSIS
         currents.nc
+          18.5, 38, 100 m: +0.07905 m/s east, -0.03942 m/s north; 0.088 m/s toward compass 117 deg
           u           uo (standard_name eastward_sea_water_velocity, m s-1)
         ...
-          18.5, 38, 100 m: +0.07905 m/s east, -0.03942 m/s north
     """
     from .water.describe import describe
 
