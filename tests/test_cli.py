@@ -31,11 +31,11 @@ def test_build_says_what_it_made(tmp_path, capsys):
     assert said.code == 0
     assert said.out.startswith("Roadmap: 77 nodes, 929 edges\n")
     assert "on 1 threads" in said.out
-    assert said.out.endswith(f"  file:   {output}\n")
     assert read_roadmap(output).target.tobytes() == roadmap().target.tobytes()
     # no terminal: a log
     assert said.err.startswith(LOG)
-    *log, note = said.err.splitlines()
+    *log, note, wrote = said.err.splitlines()
+    assert wrote == f"wrote {output}"
     assert log[-1].endswith(" left")
     assert note.startswith(
         "note: legs leave a node in 7 directions of 36, fewer than 9: a query finds a slower route than"
@@ -58,7 +58,7 @@ def test_set_reaches_the_scenario(tmp_path, capsys):
 def test_query_finds_a_path(file, tmp_path, capsys):
     path = tmp_path / "path.json"
     said = command(capsys, "query", file, "-o", path, "-o", tmp_path / "again.JSON")
-    assert (said.code, said.err) == (0, "")
+    assert (said.code, said.err) == (0, f"wrote {path}, {tmp_path / 'again.JSON'}\n")
     assert said.out.startswith("path from (-190, 190, 0) to (160, -160, 0): 4 legs, ")
     assert said.out.count("\n") == 6
     assert strict_json(path.read_text())["found"] is True
