@@ -214,7 +214,12 @@ SETS = {
     "half a list": ("sampling.shape=[5,5", "`sampling.shape` must be a list of 3", "got '[5,5'"),
     "NaN": ("integration.dt=nan", "`integration.dt` must be a finite number; got nan"),
     "a key that goes with another kind": ("neighbours.radius=5", "`neighbours.radius` is not known"),
-    "a kind that lacks its keys": ("sampling.kind=sobol", "`sampling.count` is missing"),
+    "a kind that lacks several keys": (
+        "flow.kind=upwelling",
+        "`flow.u`, `flow.v`, `flow.w` are missing",
+        "in the form --set flow.u=NUMBER --set flow.v=NUMBER --set flow.w=NUMBER",
+    ),
+    "a kind that lacks its keys": ("sampling.kind=sobol", "`sampling.count`, `sampling.seed` are missing"),
     "a whole section": ("sampling={kind='sobol'}", "section.key=value"),
     "more than any memory": (
         "sampling.shape=[9000000000,90000000,9]",
