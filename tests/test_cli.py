@@ -60,6 +60,10 @@ def test_query_finds_a_path(file, tmp_path, capsys):
     said = command(capsys, "query", file, "-o", path, "-o", tmp_path / "again.JSON")
     assert (said.code, said.err) == (0, f"wrote {path}, {tmp_path / 'again.JSON'}\n")
     assert said.out.startswith("path from (-190, 190, 0) to (160, -160, 0): 4 legs, ")
+    assert said.out.endswith(f"; for a closer bound, `glider-stream bound {file}`\n")
+    other = command(capsys, "query", file, "--goal=100,-100,-75").out
+    assert "at most" in other
+    assert "closer bound" not in other  # that would be of the scenario's own ends
     assert said.out.count("\n") == 6
     assert strict_json(path.read_text())["found"] is True
     assert (tmp_path / "again.JSON").read_text() == path.read_text()

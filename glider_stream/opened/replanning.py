@@ -117,11 +117,18 @@ def _found(
         nodes = np.ascontiguousarray(searches.position[near])
         among = ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen)
         new = routed(searches, among, ends, **finding)
-        if new.found and (share == NEAR[-1] or _stays_within(new, searches.position, longer, share / 2)):
-            which = f"{near.mean():.0%} of the nodes, those on ways of the roadmap's legs at most {share:.0%}"
-            cure = "--all-nodes searches all, which takes longer"
-            return new, among, (f"searched among {which} longer than their best; {cure}",)
+        inside = new.found and _stays_within(new, searches.position, longer, share / 2)
+        if inside or (new.found and share == NEAR[-1]):
+            return new, among, (_told(int(near.sum()), near.size, share, inside),)
     return routed(searches, planner, ends, **finding), planner, ()
+
+
+def _told(searched: int, nodes: int, share: float, inside: bool) -> str:
+    """Return a note on which nodes were searched, and whether that may matter."""
+    far = f"ways at most {share:.0%} longer than the best, by the roadmap's legs"
+    edge = "the route comes near their edge, so a better one may lie beyond"
+    keeps = "the route keeps well inside these" if inside else edge
+    return f"to be quick, only the {searched:,} nodes on {far}, were searched; {keeps}; --all-nodes takes all {nodes:,}"
 
 
 def _stays_within(path: Path, position: Array, longer: Array, share: float) -> bool:
