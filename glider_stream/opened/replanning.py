@@ -6,10 +6,10 @@ from pathlib import Path as File
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Bools
 from ..base.clock import moment
+from ..base.nearest import tree_of
 from ..base.settings import require
 from ..pilot.replan import Replan, compared, good_until_of, shown
 from ..pilot.slocum import RADIUS
@@ -128,14 +128,15 @@ def _told(searched: int, nodes: int, share: float, inside: bool) -> str:
     far = f"ways at most {share:.0%} longer than the best, by the roadmap's legs"
     edge = "the route comes near their edge, so a better one may lie beyond"
     keeps = "the route keeps well inside these" if inside else edge
-    return f"to be quick, only the {searched:,} nodes on {far}, were searched; {keeps}; --all-nodes takes all {nodes:,}"
+    some = f"to be quick, only the {searched:,} nodes on {far}, were searched"
+    return f"{some}; {keeps}; --all-nodes takes all {nodes:,}"
 
 
 def _stays_within(path: Path, position: Array, longer: Array, share: float) -> bool:
     """Return whether the nodes (n, 3) [m] at a path's stops lie on ways at most a share `longer` (n,) than the
     best."""
     stops = np.array([leg.end for leg in path.legs[:-1]]).reshape(-1, 3)
-    return bool((longer[KDTree(position).query(stops)[1]] <= share).all())
+    return bool((longer[tree_of(position).query(stops)[1]] <= share).all())
 
 
 def _longer(searches: Searches, start: Array, goal: Array) -> Array:
