@@ -13,7 +13,7 @@ from .mission.confidence.judged import Criterion
 from .mission.settings import Mission, read_mission
 from .pilot.export import check_export, check_places, export_path
 from .search.flown_on import check_plan
-from .search.path import Path, check_frame, load_path
+from .search.path import Path, check_frame, load_plan
 
 Best = float | str
 """A share, 0.9 for the time by which 90 % arrive; "mean"; or "by" for most arrivals by a time."""
@@ -51,7 +51,7 @@ def answered(
     criterion = _criterion(best, by, resolved.arrival.longest)
     check_places(outputs, resolved.scenario.domain.frame() is not None)
     ensemble = drawn(resolved, draws, first) if draws is not None else from_files(resolved, members)
-    named = [(File(route).name, load_path(route)) for route in routes]
+    named = [(File(route).name, load_plan(route)) for route in routes]
     if named:
         ensemble = _between(ensemble, named)
     found = confidence_of(ensemble, criterion, named, replanned=replanned, reach=reach)

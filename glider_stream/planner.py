@@ -32,7 +32,7 @@ from .roadmap.slices import SlicedRoadmap
 from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario
 from .search.departures import Moment
-from .search.path import Path, load_path
+from .search.path import Path, load_plan
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .water.domain import Point
@@ -329,7 +329,7 @@ def replan(
     """
     refines = options.get("within") is not None or options.get("seconds") is not None
     split_outputs(options.get("outputs", ()), refines)  # before the roadmap is read
-    old = path if isinstance(path, Path) else load_path(path)
+    old = path if isinstance(path, Path) else load_plan(path)
     opened = open_plan(old, overrides) if source is None else open_either(source, overrides)
     return opened.replan(old, fix, time, **options)
 

@@ -20,7 +20,7 @@ from ..scenario import with_currents
 from ..search.assembly import RoutePlanner
 from ..search.departures import Moment, seconds
 from ..search.flown_on import check_currents, check_plan, check_smooth, flown_on
-from ..search.path import SURFACE, Path, load_path, placed
+from ..search.path import SURFACE, Path, load_plan, placed
 from ..search.query import Planner
 from ..search.surfacing import Surfacing
 from ..search.time_dependent import ClockPlanner
@@ -66,7 +66,7 @@ def replanned(
     **options: Any,
 ) -> Replan:
     """Return a new plan from a position fix to the goal of an old plan; see `OpenedScenario.replan`."""
-    old = path if isinstance(path, Path) else load_path(path)
+    old = path if isinstance(path, Path) else load_plan(path)
     require(len(old.legs) > 0, "the plan holds no leg, so nothing is left to be planned anew; plan a route first")
     require(0 <= tolerance < np.inf, f"the tolerance must be from 0 % up; got {tolerance:.0%}")
     # a newer forecast is often written over the older one, whose currents are then no more known

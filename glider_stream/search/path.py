@@ -360,10 +360,7 @@ NO_ORIGIN = (
 
 
 def load_path(file: str | File) -> Path:
-    """Read a path file (JSON) that `query` wrote; InputError if it is another file or holds no leg.
-
-    InputWarning if it does not say what it was planned with: then nothing tells from where its metres count.
-    """
+    """Read a path file (JSON) that `query` wrote; InputError if it is another file or holds no leg."""
     try:
         size = File(file).stat().st_size
         require(size <= MOST_TEXT, f"it holds {size:,} bytes, more than a path needs ({MOST_TEXT:,})")
@@ -391,10 +388,19 @@ def load_path(file: str | File) -> Path:
     departure = float(_numbers(table, "departure_s", "the path")) if "departure_s" in table else None
     frozen = table.get("frozen") is True
     origin = _read_origin(table["origin"], file) if "origin" in table else None
-    if origin is None:
-        warnings.warn(f"the path file {file} {NO_ORIGIN}", InputWarning, stacklevel=2)
     known: dict[str, Any] = {"least": least, "departure": departure, "frozen": frozen, "origin": origin}
     return Path(legs[0].start, legs[-1].end, cost, legs, **known)
+
+
+def load_plan(file: str | File) -> Path:
+    """Read a path file, as `load_path` does, to put it into a scenario's water.
+
+    InputWarning if it does not say what it was planned with: then nothing tells from where its metres count.
+    """
+    path = load_path(file)
+    if path.origin is None:
+        warnings.warn(f"the path file {file} {NO_ORIGIN}", InputWarning, stacklevel=2)
+    return path
 
 
 def _read_origin(table: Any, file: str | File) -> Origin:

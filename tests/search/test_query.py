@@ -15,7 +15,7 @@ from glider_stream.pilot.export import EXPORTS, Options
 from glider_stream.pilot.route_files import read_drawn
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
-from glider_stream.search.path import load_path, shortened
+from glider_stream.search.path import load_path, load_plan, shortened
 from glider_stream.search.query import Planner
 
 START, GOAL = (-190.0, 190.0, 0.0), (160.0, -160.0, 0.0)
@@ -257,7 +257,7 @@ def test_a_path_file_without_its_origin_is_an_assumption(tmp_path):
     with pytest.warns(
         InputWarning, match=r"no `origin`, .* taken as metres from the origin of the scenario here"
     ):
-        assert load_path(file).origin is None
+        assert load_plan(file).origin is None
     (note,) = read_drawn(file).notes
     assert "taken as metres from the origin" in note
 
