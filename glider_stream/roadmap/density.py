@@ -40,7 +40,7 @@ class Density:
         found = []
         if self.legs > WIDEST:
             found.append(f"nodes lie {self.legs:.2g} legs apart, more than {WIDEST:g}")
-        if self.directions < FEWEST:
+        if round(self.directions) < FEWEST:  # as it is shown
             few = f"legs leave a node in {self.directions:.0f} directions of {SECTORS}"
             found.append(f"{few}, fewer than {FEWEST:.0f}")
         cure = (
