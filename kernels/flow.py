@@ -23,7 +23,7 @@ ROUNDING = 1e-9
 
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
-Slot = tuple[int, float]
+Slot = tuple[np.uintp, float]
 """The number of a level or time of a grid, and the weight of the next one."""
 Numbers = NDArray[np.int64]
 """Numbers of nodes and pairs, and the positions where rows begin."""
