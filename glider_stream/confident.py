@@ -1,6 +1,7 @@
 """Answers with confidence: reads mission, members and routes, and writes the route, and a figure."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path as File
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from .base.settings import require
 from .mission.confidence.answer import Confidence, confidence_of
 from .mission.confidence.candidates import FORECAST
-from .mission.confidence.ensemble import Ensemble, drawn, first_member, from_files
+from .mission.confidence.ensemble import Ensemble, Progress, drawn, first_member, from_files
 from .mission.confidence.judged import Criterion
 from .mission.settings import Mission, read_mission
 from .pilot.export import check_export, check_places, export_path
@@ -34,6 +35,7 @@ def answered(
     outputs: Sequence[str | File],
     figure: str | File | None,
     overrides: Sequence[str],
+    progress: Callable[[Progress], None],
 ) -> tuple[Confidence, list[str]]:
     """Return the answer, and notes on the files that are written; see `planner.confidence`."""
     require(
@@ -51,6 +53,7 @@ def answered(
     criterion = _criterion(best, by, resolved.arrival.longest)
     check_places(outputs, resolved.scenario.domain.frame() is not None)
     ensemble = drawn(resolved, draws, first) if draws is not None else from_files(resolved, members)
+    ensemble = replace(ensemble, progress=progress)
     named = [(File(route).name, load_plan(route)) for route in routes]
     if named:
         ensemble = _between(ensemble, named)

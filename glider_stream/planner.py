@@ -909,6 +909,7 @@ def confidence(
     outputs: Sequence[str | File] = (),
     figure: str | File | None = None,
     overrides: Sequence[str] = (),
+    progress: "Callable[[Any], None]" = lambda progress: None,
 ) -> "tuple[Confidence, list[str]]":
     """Return how often and by when routes arrive in an ensemble of currents, and notes on the files written.
 
@@ -917,6 +918,7 @@ def confidence(
     number `first` on. Without `routes` (path files) candidates are searched. `best`: 0.9 for the earliest time by
     which 90 % arrive, "mean", or "by" for most arrivals `by` a time [s]. `replanned`: candidates are ways to plan
     anew at each call. `reach`: also where a vehicle can be by then. The chosen route is written to `outputs`.
+    `progress` is told of each member that is done.
 
     Examples:
         >>> answer, _ = planner.confidence("small-mission.toml", draws=2, best="mean")
@@ -925,5 +927,5 @@ def confidence(
     """
     from .confident import answered
 
-    given = (routes, members, draws, first, best, by, replanned, reach, outputs, figure, overrides)
+    given = (routes, members, draws, first, best, by, replanned, reach, outputs, figure, overrides, progress)
     return answered(mission, *given)

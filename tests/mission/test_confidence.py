@@ -155,6 +155,8 @@ def test_the_command_chooses_and_looks_at_a_route(folder, capsys, monkeypatch):
         capsys, "confidence", "small-mission.toml", "--draws", "4", "--best", "80%", *outputs, "--json"
     )
     assert said.code == 0, said.err
+    for work in ("legs", "routes", "flights", "tracks"):
+        assert f"confidence: {work}: 4 of 4 members" in said.err
     table = json.loads(said.out)
     chosen = next(row for row in table["candidates"] if row["name"] == table["chosen"]["name"])
     assert chosen["arrived_share"][0] == 1.0  # with four members, 80 % is all of them

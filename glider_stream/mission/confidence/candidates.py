@@ -130,7 +130,7 @@ class Search:
     def _of_members(self) -> list[Candidate]:
         """Return the fastest route in each member's current."""
         found, rule = [], self.office.mission.pilot.rule
-        for n, problem in enumerate(self.ensemble.each()):
+        for n, problem in enumerate(self.ensemble.each("routes")):
             road = None if self.shared is None else self.shared.members[n]
             path = planner_of(problem, road, rule).query()
             if path.legs:

@@ -1,6 +1,6 @@
 """Ensembles: the problems of currents that may be, which differ in nothing but the current."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,11 +27,27 @@ KEPT = 64
 
 
 @dataclass(frozen=True)
+class Progress:
+    """How many members of all are done with some work, `what` in words."""
+
+    done: int
+    total: int
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.done} of {self.total} members"
+
+
+def _silent(progress: Progress) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True)
 class Ensemble:
     """The members of an ensemble, and the `forecast` that a pilot plans with.
 
     `numbers`: those of the members, by which currents and the vehicle's errors are drawn. `words` describe them.
-    `names`: those of members that were read from files.
+    `names`: those of members that were read from files. `progress` is told of each member that is done.
     """
 
     mission: Mission
@@ -41,16 +57,18 @@ class Ensemble:
     worlds: Worlds | None = None
     members: dict[int, Problem] = field(default_factory=dict)
     names: tuple[str, ...] = ()
+    progress: Callable[[Progress], None] = _silent
 
     @property
     def count(self) -> int:
         """The number of members."""
         return len(self.numbers)
 
-    def each(self) -> Iterator[Problem]:
-        """Yield the members' problems, in the order of `numbers`."""
-        for number in self.numbers:
+    def each(self, what: str = "members") -> Iterator[Problem]:
+        """Yield the members' problems, in the order of `numbers`; `what` says for which work."""
+        for done, number in enumerate(self.numbers, 1):
             yield self._member(number)
+            self.progress(Progress(done, self.count, what))
 
     def _member(self, number: int) -> Problem:
         made = self.members.get(number)
