@@ -323,6 +323,7 @@ PATH = (
     '{"found": true, "cost": 1, "legs": [{"from": [0, 0, 0], "to": [0, 0, -1], "glide_angle_rad": -0.5, '
     '"heading_rad": 0, "speed_mps": 1, "depart_s": 0, "duration_s": %s, "miss_m": 0, "trajectory": %s}]}'
 )
+ORIGIN = ', "origin": {"departure_s": 0.0, "scenario": ""}}'
 PATHS = {
     "no JSON": "no JSON",
     "a list": "[]",
@@ -336,8 +337,11 @@ PATHS = {
     "rows of three": PATH % ("1", "[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]"),
     "back in time": PATH % ("1", "[[5, 0, 0, 0], [1, 0, 0, -1]]"),
     "no time at all": PATH % ("0", "[[0, 0, 0, 0], [0, 0, 0, -1]]"),
-    "another water": PATH.replace("[0, 0, 0]", "[0, 9999, 0]").replace("[0, 0, -1]", "[0, 9999, -0.479]")
-    % ("1", "[[0, 0, 9999, 0], [1, 0, 9999, -0.479]]"),
+    "another water": PATH.removesuffix("}")
+    .replace("[0, 0, 0]", "[0, 9999, 0]")
+    .replace("[0, 0, -1]", "[0, 9999, -0.479]")
+    % ("1", "[[0, 0, 9999, 0], [1, 0, 9999, -0.479]]")
+    + ORIGIN,
     "legs that were not found": PATH.replace("true", "false") % ("1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a time below 0": PATH % ("-1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a leg from nowhere": '{"found": true, "cost": 1, "legs": [{"from": [1, 2], "to": [1, 2, 3]}]}',
