@@ -35,6 +35,8 @@ def beside_ours(rows: list[Row]) -> list[tuple[str, Row, float]]:
 def answer(rows: list[Row]) -> str:
     """One sentence: on how many problems no peer's route is faster than ours by over TOLERANCE; where one is."""
     told = beside_ours(rows)
+    if not told:
+        return "No problem has both a route of ours and a peer's."
     slower = [
         f"{problem} ({row['peer']}, {100 * (over - 1):.1f} %)"
         for problem, row, over in told
