@@ -1,9 +1,9 @@
 """Drift by OceanTracker: its reader of Copernicus files, Runge-Kutta 4, no dispersion.
 
 Its reader wants the product's file of land and depths. That one is made from the currents' own land mask: `mask`
-is where there is a current, `deptho` the depth of the deepest level with water, `deptho_lev` how many have it.
-The reader is the one that keeps the file's own nodes. What 0.5.3.9 takes by itself makes currents four times as
-fast: it divides a sum of four by `isfinite(a) + isfinite(b) + ...`, which NumPy adds to one.
+is where there is a current, `deptho` the depth of the deepest level with water, `deptho_lev` how many have it, -1
+on land. The reader is the one that keeps the file's own nodes. What 0.5.3.9 takes by itself makes currents four
+times as fast: it divides a sum of four by `isfinite(a) + isfinite(b) + ...`, which NumPy adds to one.
 """
 
 import contextlib
@@ -22,7 +22,7 @@ data = xr.open_dataset(JOB["twice"]).load()
 data.to_netcdf(folder / "currents.nc", engine="h5netcdf")
 water = data["uo"].isel(time=0, drop=True).notnull()
 land = {"mask": water.astype("int8"), "deptho": data["depth"].where(water).max("depth")}
-land["deptho_lev"] = water.sum("depth").astype("int32")
+land["deptho_lev"] = water.sum("depth").where(water.any("depth"), -1).astype("int32")
 xr.Dataset(land).to_netcdf(folder / "static.nc", engine="h5netcdf")
 
 

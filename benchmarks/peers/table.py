@@ -40,7 +40,7 @@ def _legs(row: Row) -> list[str]:
     middle, low, high = (_or_none(row["routes_s"][key], ",.0f") for key in ("median", "low", "high"))
     return [
         row["found"],
-        f"{middle} s ({low} to {high})",
+        "none" if low == "none" else f"{middle} s ({low} to {high})".replace("none s", "none"),
         _or_none(row["over_level_set"], ".3f"),
         _seconds(row["processor_s"]),
     ]
