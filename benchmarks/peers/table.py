@@ -24,7 +24,7 @@ def _drift(row: Row) -> list[str]:
     ends = row.get("metres_from_ours", {"median": math.nan, "most": math.nan})
     return [
         f"{rate['median']:.3g} million/s ({rate['low']:.3g} to {rate['high']:.3g})",
-        f"{ends['median']:.2g} m, {ends['most']:.2g} m",
+        f"{ends['median']:.3g} m, {ends['most']:.3g} m",
     ]
 
 
@@ -40,7 +40,7 @@ def _legs(row: Row) -> list[str]:
     middle, low, high = (_or_none(row["routes_s"][key], ",.0f") for key in ("median", "low", "high"))
     return [
         row["found"],
-        "none" if low == "none" else f"{middle} s ({low} to {high})".replace("none s", "none"),
+        f"{middle}{' s' * (middle != 'none')} ({low} to {high})",
         _or_none(row["over_level_set"], ".3f"),
         _seconds(row["processor_s"]),
     ]
