@@ -162,15 +162,15 @@ def environment(peer: Peer, folder: Path) -> Path:
     """The Python of the environment of a peer's packages, made if it is not there. RuntimeError if pip fails."""
     name = "+".join("project" if str(PROJECT) in one else one.strip("-") for one in peer.packages)
     place = folder / "environments" / name
-    python, done = place / "bin" / "python", place / "installed"
-    if not done.exists():
+    python, done, wanted = place / "bin" / "python", place / "installed", "\n".join(peer.packages)
+    if not done.exists() or done.read_text() != wanted:  # another checkout of this project is another package
         venv.create(place, with_pip=True, clear=True)
         made = subprocess.run(
             [python, "-m", "pip", "install", "--quiet", *peer.packages], capture_output=True, text=True
         )
         if made.returncode:
             raise RuntimeError(f"pip: {last_line(made.stderr)}")
-        done.touch()
+        done.write_text(wanted)
     return python
 
 

@@ -3,6 +3,7 @@
 import copy
 import importlib
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -60,6 +61,24 @@ def test_what_failed_is_asked_again_and_what_answered_is_not(peers, tmp_path, mo
     assert run.ask(peer, tmp_path, {"runs": 1})["routes_s"] == [1.0]
     assert len(asked) == 2
     assert asked[0]["planner"] == "RRTstar"
+
+
+def test_an_environment_of_another_checkout_is_made_anew(peers, tmp_path, monkeypatch):
+    run, asked = peers["run"], []
+    peer = run.PEERS[0]
+
+    def pip(command, **_):
+        asked.append(command)
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(run.venv, "create", lambda place, **_: place.mkdir(parents=True, exist_ok=True))
+    monkeypatch.setattr(run.subprocess, "run", pip)
+    python = run.environment(peer, tmp_path)
+    assert run.environment(peer, tmp_path) == python
+    assert len(asked) == 1
+    (python.parents[1] / "installed").write_text("--editable\nelsewhere[ocean]")
+    assert run.environment(peer, tmp_path) == python
+    assert len(asked) == 2
 
 
 def test_every_peer_has_an_answer_of_its_own_and_a_script(peers):
