@@ -64,6 +64,7 @@ class Bound:
 
     `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each. `frozen`: the front moves in the current of
     the departure, though the flow changes. `sound`: the current is that of all depths, no mean of several.
+    `early` [s]: by how much the time may be below the optimum, since the front begins at a set around one end.
     """
 
     time: float
@@ -72,6 +73,7 @@ class Bound:
     spacing: tuple[float, ...]
     frozen: bool = False
     sound: bool = True
+    early: float = 0.0
 
     @property
     def least(self) -> float:
@@ -86,14 +88,17 @@ class Bound:
             "least_s": self.least,
             "dimensions": self.dimensions,
             "spacing_m": list(self.spacing),
+            "early_s": self.early if math.isfinite(self.early) else None,
             "kind": "bound" if self.sound else "estimate",
             **({"frozen": True} if self.frozen else {}),
         }
 
     def __str__(self) -> str:
         grid = " x ".join(f"{step:,.0f}" for step in self.spacing)
-        found = f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s" + (
-            f"; {STILL}" if self.frozen else ""
+        early = f"by up to {self.early:,.0f} s" if math.isfinite(self.early) else "by an unknown time"
+        found = (
+            f"{span(self.time)} on a grid of {grid} m, {early} too early, since it begins at a set around one "
+            f"end; two grids differ by {self.error:,.0f} s" + (f"; {STILL}" if self.frozen else "")
         )
         if self.sound:
             return f"no route takes less than {span(self.least)}: a level set in all depths arrives after {found}"
@@ -279,6 +284,16 @@ class Front:
         place[: carried.size] += sign * began * carried
         return began, place
 
+    @property
+    def early(self) -> float:
+        """By how much [s] the arrival may be too early, since the front begins at a set and not at a point.
+
+        After tau / (1 + m / Vh) a glider from the start is still within the set; after tau / (1 - m / Vh) it can
+        be anywhere in it. inf if the current near the start differs by more than the glider's speed.
+        """
+        off = self.tau / self.began - 1.0
+        return self.tau / (1.0 - off) - self.began if off < 1 else math.inf
+
     def arrival(self, progress: Callable[[float, float], None] = lambda now, left: None) -> float:
         """When the far end is reached [s], as the module says; inf where that is never.
 
@@ -424,4 +439,4 @@ def bound(
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]
     still = problem.frozen and not is_steady(waters.flow)
     sound = size == 3 or any_depth or not waters.varies(front.nodes, 0.0)
-    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still, sound)
+    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still, sound, front.early)
