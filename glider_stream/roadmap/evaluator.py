@@ -37,6 +37,16 @@ class Evaluator:
     integration: IntegrationSettings
     cost: Cost = TravelTime()  # noqa: RUF009  (frozen)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "steering", self.steering.in_flow(self.flow))
+        # a method that tries controls one by one counts even steps
+        if self.steering.counts_steps:
+            object.__setattr__(self, "flow", flow.on_even_steps(self.flow))
+
+    def on_even_steps(self) -> "Evaluator":
+        """Return the same evaluator in a flow without a ladder, so that all its steps last `integration.dt`."""
+        return replace(self, flow=flow.on_even_steps(self.flow))
+
     def connect(
         self,
         position: ArrayLike,

@@ -1,0 +1,115 @@
+"""The heights at which steps through a file's currents end, chosen by how the currents bend at the file's levels.
+
+Between two levels a current is linear in height, and a step of RK4 makes next to no error. Over a level at which
+its slope changes by b [1/s] a step from z to z + H makes an error of b H^2 K(s) / w [m] at the vertical speed w.
+There s is the level's share of H, from its nearer end, and K(s) = |s^2 / 2 - s / 6| is the Peano kernel of Simpson's
+rule.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...kernels.flow import FANS, LEGS, Ladder
+
+SHIFTS = {LEGS: 0.03, FANS: 4.0}
+"""The errors of the steps through all levels may add up to this much [m^2/s], a distance times the vertical
+speed."""
+SHIFT = 0.1
+"""A bend across, at a side of a cell, or in time, may move the end of a step by this much [m]."""
+THROUGH_WATER = 1.0
+"""No glider is faster than this [m/s]."""
+WORST_MIDDLE = 24.0
+"""K(s) is at most one over this, in the middle of a step."""
+
+
+def _greatest(change: Array) -> Array:
+    """Return the greatest length of vectors (..., 2), over all axes but the first."""
+    return np.asarray(np.sqrt((change**2).sum(axis=-1).reshape(len(change), -1).max(axis=1, initial=0.0)))
+
+
+def bends(values: Array, levels: Array) -> Array:
+    """Return the most by which the slope of a current changes at each level, (levels,) [1/s].
+
+    `values` (times, levels, ni, nj, 2) [m/s]; above the last level, and below the first, the current is even.
+    """
+    found, below = np.zeros(levels.size), np.zeros_like(values[:, 0])
+    for k in range(levels.size):
+        last = k + 1 == levels.size
+        above = np.zeros_like(below) if last else (values[:, k + 1] - values[:, k]) / (levels[k + 1] - levels[k])
+        found[k] = _greatest((above - below)[None, ...])[0]
+        below = above
+    return found
+
+
+def step_errors(heights: Array, bend: Array) -> Array:
+    """Return the error times the vertical speed of a step from each height to each higher one, (n, n) [m^2/s]."""
+    low, high, at = heights[:, None, None], heights[None, :, None], heights[None, None, :]
+    span = np.where(high > low, high - low, 1.0)
+    share = (at - low) / span
+    share = np.clip(np.minimum(share, 1.0 - share), 0.0, None)
+    return np.asarray((bend * span[..., 0:1] ** 2 * np.abs(share**2 / 2 - share / 6)).sum(axis=-1))
+
+
+def fewest_steps(error: Array, most: float) -> list[int]:
+    """Return the indices, rising, of the heights at which steps end: as few as keep the sum of errors to `most`.
+
+    Steps lead from the first height to the last one; `error` (n, n) as `step_errors` gives it.
+    """
+    n = len(error)
+    error = np.where(np.triu(np.ones((n, n), dtype=bool), 1), error, np.inf)
+    least, before = np.full(n, np.inf), []
+    least[0] = 0.0
+    while not least[-1] <= most:
+        total = least[:, None] + error
+        before.append(total.argmin(axis=0))
+        least = total.min(axis=0)
+    path = [n - 1]
+    for step in reversed(before):
+        path.append(int(step[path[-1]]))
+    return path[::-1]
+
+
+def most_shift(error: Array, heights: Array, bend: Array, path: list[int]) -> float:
+    """Return a bound of the sum of errors of all steps of a leg between any two heights [m^2/s].
+
+    Its first step and its last one may begin and end anywhere, and a step that would take too long is cut.
+    """
+    total, part = 0.0, 0.0
+    for low, high in pairwise(path):
+        worst = float(bend[low + 1 : high].sum()) * (heights[high] - heights[low]) ** 2 / WORST_MIDDLE
+        total += max(float(error[low, high]), worst / 4)
+        part = max(part, worst)
+    return total + 2 * part
+
+
+def _in_layers(rungs: Array, levels: Array) -> Array:
+    """Return the next rung down and up from each layer, below the lowest level first, (levels + 1, 2) [m]."""
+    low = np.concatenate([[-np.inf], levels])
+    high = np.concatenate([levels, [np.inf]])
+    ends = np.concatenate([[-np.inf], rungs, [np.inf]])
+    down = ends[np.searchsorted(ends, low, side="right") - 1]
+    return np.stack([down, ends[np.searchsorted(ends, high, side="left")]], axis=-1)
+
+
+def ladder_of(values: Array, levels: Array, times: Array | None, spacing: float) -> Ladder:
+    """Return the ladder of currents (times, levels, ni, nj, 2) [m/s] on rising levels [m], `spacing` [m] apart.
+
+    `times` [s], or None where the currents are steady.
+    """
+    heights, bend = levels, bends(values, levels)
+    if levels[-1] < 0.0:
+        heights, bend = np.append(levels, 0.0), np.append(bend, 0.0)
+    error = step_errors(heights, bend)
+    chosen = [fewest_steps(error, SHIFTS[use]) for use in (LEGS, FANS)]
+    rungs = np.stack([_in_layers(heights[each], levels) for each in chosen])
+    fastest = THROUGH_WATER + float(np.sqrt((values**2).sum(axis=-1).max()))
+    across = max(_greatest(np.diff(values, 2, axis=axis)[None, ...])[0] for axis in (2, 3)) / spacing
+    bent = fastest * across
+    if times is not None:
+        slopes = (np.diff(values, axis=0).T / np.diff(times)).T
+        bent += _greatest(np.diff(slopes, axis=0)[None, ...])[0]
+    longest = math.sqrt(WORST_MIDDLE * SHIFT / max(bent, 1e-12))
+    return Ladder(rungs, longest, most_shift(error, heights, bend, chosen[LEGS]))
