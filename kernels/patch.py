@@ -23,7 +23,7 @@ where a landing beyond the patch is missing."""
 BENT = 8.0
 """A cell whose middle lies this far [m] from its linear image is halved."""
 BENT_SHARE = 0.005
-"""In a file's grid it may lie as far as this share of a cell of the file: guesses know the bend, and over a part of
+"""In a file's grid it may lie as far as this share of a cell of the file: guesses know the bend, and in a part of
 such a cell it hardly changes."""
 MARGIN = 0.35
 """A target this far outside a triangle, in its own units, is a guess where none is inside."""

@@ -2,8 +2,8 @@
 
 Between two levels a current is linear in height, and a step of RK4 makes next to no error. Over a level at which
 its slope changes by b [1/s] a step from z to z + H makes an error of b H^2 K(s) / w [m] at the vertical speed w.
-There s is the level's share of H, from its nearer end, and K(s) = |s^2 / 2 - s / 6| is the Peano kernel of Simpson's
-rule.
+There s is the level's share of H, from its nearer end, and K(s) = |s^2 / 2 - s / 6| is the Peano kernel of
+Simpson's rule.
 """
 
 import math
