@@ -38,7 +38,9 @@ class Evaluator:
     cost: Cost = TravelTime()  # noqa: RUF009  (frozen)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "steering", self.steering.in_flow(self.flow))
+        object.__setattr__(
+            self, "steering", self.steering.in_flow(self.flow, self.integration.dt * self.integration.steps)
+        )
         # a method that tries controls one by one counts even steps
         if self.steering.counts_steps:
             object.__setattr__(self, "flow", flow.on_even_steps(self.flow))

@@ -11,7 +11,8 @@ from ..base.checks import LONGEST, WIDEST
 from ..base.settings import require
 from ..kernels import connect, control, motion, refine
 from ..kernels.fan import FlowMap
-from ..kernels.flow import NO_LADDER, Flow, ladder_in
+from ..kernels.flow import Flow, OceanGrid
+from ..water.ocean.ladder import greatest_strain
 
 Connector = Callable[..., None]
 """A kernel that tries pairs one by one, such as those of kernels/connect.py."""
@@ -19,8 +20,10 @@ Connector = Callable[..., None]
 MAX_CANDIDATES = 1_000_000
 """The greatest number of candidate controls of a pair."""
 
-FAN, FILE_FAN = (6, 12), (4, 8)
-"""The coarsest mesh; a file's currents are smooth where gliders fly, so that there fewer controls suffice."""
+FAN, CALM_FAN = (6, 12), (4, 8)
+"""The coarsest mesh of a fan; in a file's currents that hardly deform it fewer controls suffice."""
+CALM = 0.5
+"""Currents are calm whose strain, times the horizon, is less than this: they cannot fold a fan."""
 MAX_FAN, MAX_GENERATIONS = 1000, 6
 """The greatest number of angles and headings of a fan, and of generations in which its cells are halved."""
 
@@ -45,7 +48,7 @@ class SurfaceMethod:
         """Return the same settings in the form that the kernels read."""
         return control.Surface(self.candidates)
 
-    def in_flow(self, flow: Flow) -> "SurfaceMethod":
+    def in_flow(self, flow: Flow, horizon: float) -> "SurfaceMethod":
         """Return the same method: it has no mesh."""
         return self
 
@@ -79,7 +82,7 @@ class StreamlineMethod:
         """Return the same settings in the form that the kernels read."""
         return control.Streamline(self.candidates)
 
-    def in_flow(self, flow: Flow) -> "StreamlineMethod":
+    def in_flow(self, flow: Flow, horizon: float) -> "StreamlineMethod":
         """Return the same method: it has no mesh."""
         return self
 
@@ -89,7 +92,7 @@ class FlowMapMethod:
     """Exact steering: finds every connection that exists, by the flow map of each source node.
 
     `fan` = [glide angles, headings] is the coarsest mesh over the controls of a node; by itself FAN, and
-    FILE_FAN in a file's currents. Its cells are halved once, and up to `generations` times more where they are
+    CALM_FAN in calm currents of a file. Its cells are halved once, and up to `generations` times more where they are
     bent or folded, so the result depends little on both settings.
     """
 
@@ -113,9 +116,12 @@ class FlowMapMethod:
         """Return the same settings in the form that the kernels read."""
         return FlowMap(*(self.fan or FAN), self.generations)
 
-    def in_flow(self, flow: Flow) -> "FlowMapMethod":
-        """Return the same method with the mesh that fits a flow, if none was chosen."""
-        return replace(self, fan=self.fan or (FILE_FAN if ladder_in(flow) is not NO_LADDER else FAN))
+    def in_flow(self, flow: Flow, horizon: float) -> "FlowMapMethod":
+        """Return the same method with the mesh that fits a flow and a horizon [s], if none was chosen."""
+        if self.fan is not None:
+            return self
+        calm = isinstance(flow, OceanGrid) and greatest_strain(flow) * horizon < CALM
+        return replace(self, fan=CALM_FAN if calm else FAN)
 
 
 def _check_candidates(candidates: int) -> None:

@@ -1,6 +1,7 @@
 """Legs in a file's grid: what makes them fast changes no bit of them."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from glider_stream.kernels.edges import GLIDE_ANGLE, SPEED, STATUS, Edge, Status
 from glider_stream.kernels.flow import NO_LADDER
 from glider_stream.kernels.terrain import Seabed
 from glider_stream.roadmap.evaluator import Evaluator
-from glider_stream.roadmap.steering import FAN, FILE_FAN, FlowMapMethod, IntegrationSettings, StreamlineMethod
+from glider_stream.roadmap.steering import CALM_FAN, FAN, FlowMapMethod, IntegrationSettings, StreamlineMethod
 from glider_stream.roadmap.step_error import step_error
 from glider_stream.roadmap.verify import replayed_misses
 from glider_stream.water.ocean.flow import grid_flow
@@ -122,5 +123,6 @@ def test_methods_that_count_steps_have_even_ones(charted, deep_sea, glide):
     settings = IntegrationSettings(60.0, 60, 20.0)
     assert Evaluator(charted, deep_sea, glide, StreamlineMethod(8), settings).flow.ladder is NO_LADDER
     assert Evaluator(charted, deep_sea, glide, StreamlineMethod(8, refine=True), settings).flow is charted
-    assert Evaluator(charted, deep_sea, glide, FlowMapMethod(), settings).steering.fan == FILE_FAN
-    assert Evaluator(charted, deep_sea, glide, FlowMapMethod((6, 12)), settings).steering.fan == FAN
+    assert Evaluator(charted, deep_sea, glide, FlowMapMethod(), settings).steering.fan == CALM_FAN
+    assert Evaluator(charted, deep_sea, glide, FlowMapMethod(FAN), settings).steering.fan == FAN
+    assert Evaluator(charted, deep_sea, glide, FlowMapMethod(), replace(settings, dt=600.0)).steering.fan == FAN

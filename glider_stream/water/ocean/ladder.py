@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...base.arrays import Array
-from ...kernels.flow import FANS, LEGS, Ladder
+from ...kernels.flow import FANS, LEGS, Ladder, OceanGrid
 
 SHIFTS = {LEGS: 0.03, FANS: 4.0}
 """The errors of the steps through all levels may add up to this much [m^2/s], a distance times the vertical
@@ -83,6 +83,12 @@ def most_shift(error: Array, heights: Array, bend: Array, path: list[int]) -> fl
         total += max(float(error[low, high]), worst / 4)
         part = max(part, worst)
     return total + 2 * part
+
+
+def greatest_strain(flow: OceanGrid) -> float:
+    """Return the greatest difference of the currents of neighbouring points over the size of a cell [1/s]."""
+    most = max(_greatest(np.diff(now, axis=axis)[None, ...])[0] for now in flow.values for axis in (1, 2))
+    return float(most) / flow.extent.length_scale
 
 
 def _in_layers(rungs: Array, levels: Array) -> Array:
