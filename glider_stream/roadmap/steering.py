@@ -91,9 +91,9 @@ class StreamlineMethod:
 class FlowMapMethod:
     """Exact steering: finds every connection that exists, by the flow map of each source node.
 
-    `fan` = [glide angles, headings] is the coarsest mesh over the controls of a node; by itself FAN, and
-    CALM_FAN in calm currents of a file. Its cells are halved once, and up to `generations` times more where they are
-    bent or folded, so the result depends little on both settings.
+    `fan` = [glide angles, headings] is the coarsest mesh over the controls of a node; by itself FAN, and CALM_FAN
+    in calm currents of a file. Its cells are halved once, and up to `generations` times more where they are bent
+    or folded, so the result depends little on both settings.
     """
 
     fan: tuple[int, int] | None = None
