@@ -40,7 +40,7 @@ from .water.domain import Point
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .evaluation import bench as benchmarks
+    from .evaluation import record as benchmarks
     from .evaluation.level_set import Bound
     from .evaluation.suite import Report
     from .mission.campaign import Campaign
@@ -788,25 +788,28 @@ def bench(
     quick: bool = False,
     only: Sequence[str] = (),
     ceiling: str | File | None = None,
+    currents: str | File | None = None,
     progress: "Callable[[benchmarks.Figure], None]" = lambda figure: None,
 ) -> "tuple[benchmarks.Record, list[str]]":
     """Measure this machine: return the record, and what has changed since the record `against`.
 
-    `only`: the parts to measure (empty: all); each figure is measured `runs` times. `quick`: small problems, to
-    check that everything runs. `ceiling`: a program that takes turns with the raw integrator. The record is
-    written to `output` as JSON.
+    `only`: the parts to measure; if it is empty, all but `large` (a million nodes), and but `file` without a file
+    `currents` for the scenario `ionian`. Each figure is measured `runs` times. `quick`: small problems, to check
+    that everything runs. `ceiling`: a program that takes turns with the integrator. The record is written to
+    `output` as JSON.
 
     Examples:
         >>> record, moved = planner.bench("record.json", runs=1, quick=True, only=["integrator"])
         >>> [figure.name for figure in record.figures], moved
         (['evaluations_per_s'], [])
     """
-    from .evaluation.bench import bench, read_record, write_record
+    from .evaluation.bench import bench
+    from .evaluation.record import read_record, write_record
 
     if output is not None:
         check_output(output)
     before = None if against is None else read_record(against)
-    record = bench(runs=runs, quick=quick, only=only, ceiling=ceiling, progress=progress)
+    record = bench(runs=runs, quick=quick, only=only, ceiling=ceiling, currents=currents, progress=progress)
     if output is not None:
         write_record(record.as_dict(), output)
     return record, [] if before is None else record.moved(before)
@@ -832,7 +835,7 @@ def suite(
         ...
         glider_stream.base.errors.InputError: ...atlantis...
     """
-    from .evaluation.bench import write_record
+    from .evaluation.record import write_record
     from .evaluation.suite import ompl_log, run_suite
 
     if output is not None:

@@ -30,6 +30,8 @@ LEGS, FANS = 0, 1
 
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
+Slot = tuple[np.uintp, float]
+"""The number of a level or time of a grid, and the weight of the next one."""
 Numbers = NDArray[np.int64]
 """Numbers of nodes and pairs, and the positions where rows begin."""
 
@@ -393,26 +395,33 @@ def _index_on_map(flow, x, y):
     return grid_index(flow.index_map, x, y, flow.extent.x_lo, flow.extent.y_lo, flow.per_x, flow.per_y)
 
 
-def _at_index(flow, at_i, at_j, z, t):
+def _on_levels(flow, z):
+    return _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
+
+
+def _on_times(flow, t):
+    return _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
+
+
+def _at_index(flow, at_i, at_j, level, time):
     values = flow.values
     i, a = _cell(at_i, values.shape[2])
     j, b = _cell(at_j, values.shape[3])
-    k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
-    n, d = _slot(t, flow.times, flow.time_slot, flow.slots_per_t)
+    (k, c), (n, d) = level, time
     return pair_between(values, (n, k, i, j), (d, c, a, b))
 
 
-def _at_index_once(flow, at_i, at_j, z):
+def _at_index_once(flow, at_i, at_j, level):
     values = flow.values
     i, a = _cell(at_i, values.shape[2])
     j, b = _cell(at_j, values.shape[3])
-    k, c = _slot(z, flow.levels, flow.level_slot, flow.slots_per_z)
+    k, c = level
     return pair_between(values, (np.uintp(0), k, i, j), (c, a, b))
 
 
 def _ocean_grid(flow, x, y, z, t):
     at_i, at_j = index_on_map(flow, x, y)
-    return at_index(flow, at_i, at_j, z, t)
+    return at_index(flow, at_i, at_j, on_levels(flow, z), on_times(flow, t))
 
 
 def _upwelling(flow, x, y, z, t):
@@ -530,12 +539,16 @@ def _no_index(flow, x, y):
     return math.nan, math.nan
 
 
-def _not_at_index(flow, at_i, at_j, z, t):
+def _not_at_index(flow, at_i, at_j, level, time):
     return math.nan, math.nan
 
 
-def _not_at_index_once(flow, at_i, at_j, z):
+def _not_at_index_once(flow, at_i, at_j, level):
     return math.nan, math.nan
+
+
+def _on_none(flow, at):
+    return np.uintp(0), math.nan
 
 
 def _none(flow):
@@ -611,6 +624,8 @@ class Abilities(NamedTuple):
     is_mapped: Callable[..., Any] = _no
     has_one_time: Callable[..., Any] = _no
     index_on_map: Callable[..., Any] = _no_index
+    on_levels: Callable[..., Any] = _on_none
+    on_times: Callable[..., Any] = _on_none
     at_index: Callable[..., Any] = _not_at_index
     at_index_once: Callable[..., Any] = _not_at_index_once
     has_ladder: Callable[..., Any] = _no
@@ -640,6 +655,8 @@ ABILITIES: dict[type, Abilities] = {
         is_mapped=_yes,
         has_one_time=_is_of_one_time,
         index_on_map=_index_on_map,
+        on_levels=_on_levels,
+        on_times=_on_times,
         at_index=_at_index,
         at_index_once=_at_index_once,
         has_ladder=_has_ladder,
@@ -696,14 +713,24 @@ def index_on_map(flow: Flow, x: float, y: float) -> tuple[float, float]:
     return ABILITIES[type(flow)].index_on_map(flow, x, y)
 
 
-def at_index(flow: Flow, at_i: float, at_j: float, z: float, t: float) -> tuple[float, float]:
-    """Return the current (u, v) [m/s] of a mapped flow at fractional indices, a height [m] and a time [s]."""
-    return ABILITIES[type(flow)].at_index(flow, at_i, at_j, z, t)
+def on_levels(flow: Flow, z: float) -> Slot:
+    """Return the level of a mapped flow at or below a height [m], and the weight of the next one."""
+    return ABILITIES[type(flow)].on_levels(flow, z)
 
 
-def at_index_once(flow: Flow, at_i: float, at_j: float, z: float) -> tuple[float, float]:
+def on_times(flow: Flow, t: float) -> Slot:
+    """Return the time of a mapped flow at or before a time [s], and the weight of the next one."""
+    return ABILITIES[type(flow)].on_times(flow, t)
+
+
+def at_index(flow: Flow, at_i: float, at_j: float, level: Slot, time: Slot) -> tuple[float, float]:
+    """Return the current (u, v) [m/s] of a mapped flow at fractional indices, between levels and times."""
+    return ABILITIES[type(flow)].at_index(flow, at_i, at_j, level, time)
+
+
+def at_index_once(flow: Flow, at_i: float, at_j: float, level: Slot) -> tuple[float, float]:
     """Return `at_index` of a flow that `has_one_time`: the same bits, without a look at its times."""
-    return ABILITIES[type(flow)].at_index_once(flow, at_i, at_j, z)
+    return ABILITIES[type(flow)].at_index_once(flow, at_i, at_j, level)
 
 
 def has_ladder(flow: Flow) -> bool:
@@ -747,7 +774,7 @@ def carry(flow: Flow, z: float) -> float:
 
 
 _PUBLIC = (velocity, current, rises, max_rise, contains, contains_box, carry)
-_ON_MAPS = (cell_size, is_mapped, has_one_time, index_on_map, at_index, at_index_once)
+_ON_MAPS = (cell_size, is_mapped, has_one_time, index_on_map, on_levels, on_times, at_index, at_index_once)
 _ON_LADDERS = (has_ladder, step_to_rung, longest_step)
 for _ability in (*_PUBLIC, *_ON_MAPS, *_ON_LADDERS):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})

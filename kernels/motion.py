@@ -20,6 +20,8 @@ from .flow import (
     index_on_map,
     is_mapped,
     longest_step,
+    on_levels,
+    on_times,
     rises,
     step_to_rung,
     velocity,
@@ -315,15 +317,31 @@ LANE_X, LANE_Y, LANE_Z, LANE_T, LANE_U, LANE_V, LANE_W, LANE_STEP = range(8)
 """Rows of lanes (LANE_ROWS or more, LANES): place [m], time [s], velocity through water [m/s], step [s]."""
 _U1, _V1, _U2, _V2, _U3, _V3, _XS, _YS = range(8, 16)
 _W1, _W2, _W3, _ZS = range(16, 20)
+_LEVEL, _UPPER, _TIME, _LATER = range(16, 20)
 LANE_ROWS = 20
 """The rows above and the stages' own; a caller's lanes may have more."""
 
 
 @inlined
-def _mapped_slopes(flow, flat, x, y, share, u, v):
-    """As `_slopes`: all indices first, into rows u, v, then all currents; small loops keep more in registers.
+def _find_slots(flow, flat, share):
+    """Levels and times of all lanes, and their weights, at `share` of the step; into the rows of these names."""
+    for n in range(LANES):
+        along = share * flat[np.uintp(LANE_STEP * LANES + n)]
+        level, flat[np.uintp(_UPPER * LANES + n)] = on_levels(
+            flow, flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)]
+        )
+        flat[np.uintp(_LEVEL * LANES + n)] = level
+        if not has_one_time(flow):
+            time, flat[np.uintp(_LATER * LANES + n)] = on_times(flow, flat[np.uintp(LANE_T * LANES + n)] + along)
+            flat[np.uintp(_TIME * LANES + n)] = time
 
-    A question for each lane whether the flow has one time would cost more than it saves.
+
+@inlined
+def _mapped_slopes(flow, flat, x, y, u, v):
+    """As `_slopes`, after `_find_slots`: all indices first, into rows u, v, then all currents.
+
+    Small loops keep more in registers. A question for each lane whether the flow has one time would cost more
+    than it saves.
     """
     for n in range(LANES):
         flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = index_on_map(
@@ -331,30 +349,33 @@ def _mapped_slopes(flow, flat, x, y, share, u, v):
         )
     if has_one_time(flow):
         for n in range(LANES):
-            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
             flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_index_once(
                 flow,
                 flat[np.uintp(u * LANES + n)],
                 flat[np.uintp(v * LANES + n)],
-                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
+                (np.uintp(np.intp(flat[np.uintp(_LEVEL * LANES + n)])), flat[np.uintp(_UPPER * LANES + n)]),
             )
     else:
         for n in range(LANES):
-            along = share * flat[np.uintp(LANE_STEP * LANES + n)]
             flat[np.uintp(u * LANES + n)], flat[np.uintp(v * LANES + n)] = at_index(
                 flow,
                 flat[np.uintp(u * LANES + n)],
                 flat[np.uintp(v * LANES + n)],
-                flat[np.uintp(LANE_Z * LANES + n)] + along * flat[np.uintp(LANE_W * LANES + n)],
-                flat[np.uintp(LANE_T * LANES + n)] + along,
+                (np.uintp(np.intp(flat[np.uintp(_LEVEL * LANES + n)])), flat[np.uintp(_UPPER * LANES + n)]),
+                (np.uintp(np.intp(flat[np.uintp(_TIME * LANES + n)])), flat[np.uintp(_LATER * LANES + n)]),
             )
 
 
 @kernel
-def _slopes(flow, flat, x, y, share, u, v):
-    """Currents of all lanes at rows x, y into rows u, v, at `share` of the step in depth and time."""
+def _slopes(flow, flat, x, y, share, u, v, anew=True):
+    """Currents of all lanes at rows x, y into rows u, v, at `share` of the step in depth and time.
+
+    `anew`: whether the stage before had another share.
+    """
     if is_mapped(flow):
-        _mapped_slopes(flow, flat, x, y, share, u, v)
+        if anew:
+            _find_slots(flow, flat, share)
+        _mapped_slopes(flow, flat, x, y, u, v)
         return
     for n in range(LANES):
         along = share * flat[np.uintp(LANE_STEP * LANES + n)]
@@ -406,7 +427,7 @@ def rk4_lanes(flow, lanes):
     _move(flat, 0.5, _U1, _V1)
     _slopes(flow, flat, _XS, _YS, 0.5, _U2, _V2)
     _move(flat, 0.5, _U2, _V2)
-    _slopes(flow, flat, _XS, _YS, 0.5, _U3, _V3)
+    _slopes(flow, flat, _XS, _YS, 0.5, _U3, _V3, False)
     _move(flat, 1.0, _U3, _V3)
     _slopes(flow, flat, _XS, _YS, 1.0, _XS, _YS)
     _sum(flat, LANE_X, LANE_U, _U1, _U2, _U3, _XS)

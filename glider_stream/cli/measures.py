@@ -17,6 +17,7 @@ from .options import FILE, JSON, SET
 @click.option("--suite", is_flag=True, help="Solve the named problems instead, by every method and baseline.")
 @click.option("--ompl", type=FILE, help="With --suite: a folder for logs that OMPL's tools read.")
 @click.option("--ceiling", type=FILE, help="A program to compare the integrator with.")
+@click.option("--currents", type=FILE, help="A file of currents for `ionian`: measure its legs too.")
 @click.option("--against", type=FILE, help="An older record: show what has changed since.")
 @click.option("--json", "output", type=FILE, help="The record to write.")
 def bench(
@@ -26,6 +27,7 @@ def bench(
     suite: bool,
     ompl: Path | None,
     ceiling: Path | None,
+    currents: Path | None,
     against: Path | None,
     output: Path | None,
 ) -> None:
@@ -36,7 +38,7 @@ def bench(
     from .. import planner
 
     if suite:
-        unusable = {"--runs": runs, "--ceiling": ceiling, "--against": against}
+        unusable = {"--runs": runs, "--ceiling": ceiling, "--currents": currents, "--against": against}
         for name, value in unusable.items():
             if value is not None:
                 raise click.UsageError(f"{name} does not go with --suite; leave one of them out")
@@ -53,7 +55,7 @@ def bench(
         raise click.UsageError("--ompl needs --suite; add it, or leave --ompl out")
     record, moved = planner.bench(
         output, against=against, runs=5 if runs is None else runs, quick=quick, only=only, ceiling=ceiling,
-        progress=lambda figure: say(f"bench: {figure}", error=True),
+        currents=currents, progress=lambda figure: say(f"bench: {figure}", error=True),
     )  # fmt: skip
     say(record)
     if against is not None:

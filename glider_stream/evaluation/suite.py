@@ -25,8 +25,8 @@ from ..search.answer import planner_of
 from ..search.assembly import RoutePlanner
 from ..search.surfacing import Surfacing
 from .baselines import BASELINES
-from .bench import made_by
 from .brute_force import fastest_legs
+from .record import made_by
 
 COMPARED: dict[str, Method] = {
     "flow-map": FlowMapMethod(),
