@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .cache import entry_point, inlined, kernel, making
 from .control import angle_of_vertical_speed, control_towards, vertical_speed
 from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_to, hangar, place, rest
-from .flow import LEGS, Array, Numbers, cell_size, max_rise, rises
+from .flow import Array, Numbers, cell_size, max_rise, rises
 from .motion import LANE_T, LANE_W, LANE_X, LANE_Y, LANE_Z, LANES
 from .patch import (
     BENT,
@@ -73,7 +73,7 @@ class Launch(NamedTuple):
     direction: int
     dt: float
     longest: float
-    use: int = LEGS
+    use: int
 
 
 class Sweep(NamedTuple):

@@ -47,7 +47,8 @@ def aim(medium, lanes, n, direction, pair, angle, heading):
     lanes[AIM_DIRECTION, n], lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n] = direction, angle, heading
     lanes[AIM_STATE, n], lanes[_ITERATION, n] = OPEN, 0.0
     lanes[AIM_TIME, n] = 0.0
-    take_off(medium, lanes, n, FIRST_STEP * medium.integration.dt)
+    longer = 1.0 if has_ladder(medium.flow) else FIRST_STEP
+    take_off(medium, lanes, n, longer * medium.integration.dt)
 
 
 @inlined

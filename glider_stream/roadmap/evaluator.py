@@ -197,7 +197,7 @@ class Evaluator:
         angles, headings = (np.require(a, np.float64, ["C", "W"]) for a in (glide_angle, heading))
         direction = control.CLIMB if height > origin.z else control.DIVE
         horizon = self.integration.dt * self.integration.steps
-        launch = fan.Launch(origin, direction, self.integration.dt, horizon)
+        launch = fan.Launch(origin, direction, self.integration.dt, horizon, flow.LEGS)
         where: Array = fan.landings(self.medium, launch, float(height), angles, headings)
         return where
 
