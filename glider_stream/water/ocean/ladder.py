@@ -25,9 +25,9 @@ WORST_MIDDLE = 24.0
 """K(s) is at most one over this, in the middle of a step."""
 
 
-def _greatest(change: Array) -> Array:
-    """Return the greatest length of vectors (..., 2), over all axes but the first."""
-    return np.asarray(np.sqrt((change**2).sum(axis=-1).reshape(len(change), -1).max(axis=1, initial=0.0)))
+def _greatest(change: Array) -> float:
+    """Return the greatest length of vectors (..., 2)."""
+    return float(np.sqrt((change**2).sum(axis=-1).max(initial=0.0)))
 
 
 def bends(values: Array, levels: Array) -> Array:
@@ -39,7 +39,7 @@ def bends(values: Array, levels: Array) -> Array:
     for k in range(levels.size):
         last = k + 1 == levels.size
         above = np.zeros_like(below) if last else (values[:, k + 1] - values[:, k]) / (levels[k + 1] - levels[k])
-        found[k] = _greatest((above - below)[None, ...])[0]
+        found[k] = _greatest(above - below)
         below = above
     return found
 
@@ -87,8 +87,17 @@ def most_shift(error: Array, heights: Array, bend: Array, path: list[int]) -> fl
 
 def greatest_strain(flow: OceanGrid) -> float:
     """Return the greatest difference of the currents of neighbouring points over the size of a cell [1/s]."""
-    most = max(_greatest(np.diff(now, axis=axis)[None, ...])[0] for now in flow.values for axis in (1, 2))
-    return float(most) / flow.extent.length_scale
+    most = max(_greatest(np.diff(now, axis=axis)) for now in flow.values for axis in (1, 2))
+    return most / flow.extent.length_scale
+
+
+def _bend_in_time(values: Array, times: Array) -> float:
+    """Return the most by which the rate of change of a current changes at one of the times [m/s^2]."""
+    most, before = 0.0, None
+    for n in range(times.size - 1):
+        rate = (values[n + 1] - values[n]) / (times[n + 1] - times[n])
+        most, before = max(most, 0.0 if before is None else _greatest(rate - before)), rate
+    return most
 
 
 def _in_layers(rungs: Array, levels: Array) -> Array:
@@ -111,11 +120,8 @@ def ladder_of(values: Array, levels: Array, times: Array | None, spacing: float)
     error = step_errors(heights, bend)
     chosen = [fewest_steps(error, SHIFTS[use]) for use in (LEGS, FANS)]
     rungs = np.stack([_in_layers(heights[each], levels) for each in chosen])
-    fastest = THROUGH_WATER + float(np.sqrt((values**2).sum(axis=-1).max()))
-    across = max(_greatest(np.diff(values, 2, axis=axis)[None, ...])[0] for axis in (2, 3)) / spacing
-    bent = fastest * across
-    if times is not None:
-        slopes = (np.diff(values, axis=0).T / np.diff(times)).T
-        bent += _greatest(np.diff(slopes, axis=0)[None, ...])[0]
+    fastest = THROUGH_WATER + max(_greatest(now) for now in values)
+    across = max(_greatest(np.diff(now, 2, axis=axis)) for now in values for axis in (1, 2)) / spacing
+    bent = fastest * across + (0.0 if times is None else _bend_in_time(values, times))
     longest = math.sqrt(WORST_MIDDLE * SHIFT / max(bent, 1e-12))
     return Ladder(rungs, longest, most_shift(error, heights, bend, chosen[LEGS]))
