@@ -12,7 +12,6 @@ from ..base.settings import require
 from ..kernels import connect, control, motion, refine
 from ..kernels.fan import FlowMap
 from ..kernels.flow import Flow, OceanGrid
-from ..water.ocean.ladder import greatest_strain
 
 Connector = Callable[..., None]
 """A kernel that tries pairs one by one, such as those of kernels/connect.py."""
@@ -21,9 +20,8 @@ MAX_CANDIDATES = 1_000_000
 """The greatest number of candidate controls of a pair."""
 
 FAN, CALM_FAN = (6, 12), (4, 8)
-"""The coarsest mesh of a fan; in a file's currents that hardly deform it fewer controls suffice."""
-CALM = 0.5
-"""Currents are calm whose strain, times the horizon, is less than this: they cannot fold a fan."""
+"""The coarsest mesh of a fan. Currents of a file that carry nothing over one of its cells within the horizon
+hardly deform a fan, so that there fewer controls suffice."""
 MAX_FAN, MAX_GENERATIONS = 1000, 6
 """The greatest number of angles and headings of a fan, and of generations in which its cells are halved."""
 
@@ -120,7 +118,8 @@ class FlowMapMethod:
         """Return the same method with the mesh that fits a flow and a horizon [s], if none was chosen."""
         if self.fan is not None:
             return self
-        calm = isinstance(flow, OceanGrid) and greatest_strain(flow) * horizon < CALM
+        known = flow.extent
+        calm = isinstance(flow, OceanGrid) and known.max_speed * horizon < known.length_scale
         return replace(self, fan=CALM_FAN if calm else FAN)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..kernels.edges import CONNECTED, Edge
-from ..kernels.flow import ladder_in
+from ..kernels.flow import OceanGrid, ladder_in
 from ..kernels.motion import STRETCH
-from ..water.ocean.ladder import SHIFT
+from ..water.ocean.ladder import kink_shift
 from .problem import Problem
 from .roadmap import BaseRoadmap, Edges, Provenance, in_order
 
@@ -34,7 +34,8 @@ UNTRIED = "not tried: no leg leaves any of the nodes that were asked"
 class StepError:
     """The greatest distance `off` [m] between the ends of `legs` legs in steps of `dt` [s] and in finer steps.
 
-    On a ladder a step lasts `longest` [s] at most, and bends of currents move no end by more than `bound` [m].
+    On a ladder a step lasts `longest` [s] at most. Bends of currents between levels move no end by more than `bound`
+    [m], a side of a cell by no more than `kink` [m].
     """
 
     off: float
@@ -43,6 +44,7 @@ class StepError:
     tolerance: float
     longest: float = 0.0
     bound: float = 0.0
+    kink: float = 0.0
 
     def check(self) -> None:
         """Raise InputError if the error exceeds the tolerance."""
@@ -64,7 +66,7 @@ class StepError:
         told = f"{steps}, off by {self.off:.2g} m at most of {legs} that were flown again in finer steps"
         if not self.longest:
             return told
-        passed = f"each side of a cell or time of the file that a leg passes {SHIFT:g} m"
+        passed = f"each side of a cell or time of the file that a leg passes {self.kink:.2g} m"
         return f"{told}; the file's bends from level to level allow {self.bound:.2g} m, and {passed}"
 
 
@@ -101,8 +103,11 @@ def step_error(problem: Problem, start: Array, values: Array) -> StepError:
         off = max(off, float(np.linalg.norm(ends[0] - ends[1])))
     error = StepError(off, len(some), integration.dt, integration.tolerance)
     ladder = ladder_in(evaluator.flow)
+    if not (ladder.longest and isinstance(evaluator.flow, OceanGrid)):
+        return error
     longest = min(STRETCH * integration.dt, ladder.longest)
-    return replace(error, longest=longest, bound=ladder.shift / slowest)
+    kink = kink_shift(evaluator.flow, longest)
+    return replace(error, longest=longest, bound=ladder.shift / slowest, kink=kink)
 
 
 class StepSample:

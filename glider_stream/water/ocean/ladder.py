@@ -6,7 +6,6 @@ There s is the level's share of H, from its nearer end, and K(s) = |s^2 / 2 - s 
 Simpson's rule.
 """
 
-import math
 from itertools import pairwise
 
 import numpy as np
@@ -17,10 +16,10 @@ from ...kernels.flow import FANS, LEGS, Ladder, OceanGrid
 SHIFTS = {LEGS: 0.03, FANS: 4.0}
 """The errors of the steps through all levels may add up to this much [m^2/s], a distance times the vertical
 speed."""
-SHIFT = 0.1
-"""A bend across, at a side of a cell, or in time, may move the end of a step by this much [m]."""
-THROUGH_WATER = 1.0
-"""No glider is faster than this [m/s]."""
+CELL_SHARE, TIME_SHARE = 1 / 30, 1 / 60
+"""A step is so short that at FASTEST [m/s] it passes this share of a cell, and it lasts this share of the time
+between two times of the file. Both are the same for all forecasts on one grid."""
+FASTEST = 1.0
 WORST_MIDDLE = 24.0
 """K(s) is at most one over this, in the middle of a step."""
 
@@ -85,12 +84,6 @@ def most_shift(error: Array, heights: Array, bend: Array, path: list[int]) -> fl
     return total + 2 * part
 
 
-def greatest_strain(flow: OceanGrid) -> float:
-    """Return the greatest difference of the currents of neighbouring points over the size of a cell [1/s]."""
-    most = max(_greatest(np.diff(now, axis=axis)) for now in flow.values for axis in (1, 2))
-    return most / flow.extent.length_scale
-
-
 def _bend_in_time(values: Array, times: Array) -> float:
     """Return the most by which the rate of change of a current changes at one of the times [m/s^2]."""
     most, before = 0.0, None
@@ -120,8 +113,20 @@ def ladder_of(values: Array, levels: Array, times: Array | None, spacing: float)
     error = step_errors(heights, bend)
     chosen = [fewest_steps(error, SHIFTS[use]) for use in (LEGS, FANS)]
     rungs = np.stack([_in_layers(heights[each], levels) for each in chosen])
-    fastest = THROUGH_WATER + max(_greatest(now) for now in values)
-    across = max(_greatest(np.diff(now, 2, axis=axis)) for now in values for axis in (1, 2)) / spacing
-    bent = fastest * across + (0.0 if times is None else _bend_in_time(values, times))
-    longest = math.sqrt(WORST_MIDDLE * SHIFT / max(bent, 1e-12))
+    longest = CELL_SHARE * spacing / FASTEST
+    if times is not None:
+        longest = min(longest, TIME_SHARE * float(np.diff(times).min()))
     return Ladder(rungs, longest, most_shift(error, heights, bend, chosen[LEGS]))
+
+
+def kink_shift(flow: OceanGrid, step: float) -> float:
+    """Return by how much a side of a cell, or a time of the file, may move the end of a step of `step` [s] [m].
+
+    For a glider that is carried by the fastest current and goes at FASTEST through water.
+    """
+    fastest = FASTEST + flow.extent.max_speed
+    most = max(_greatest(np.diff(now, 2, axis=axis)) for now in flow.values for axis in (1, 2))
+    bent = fastest * most / flow.extent.length_scale
+    if np.isfinite(flow.extent.t_lo):
+        bent += _bend_in_time(flow.values, flow.times)
+    return bent * step**2 / WORST_MIDDLE
