@@ -32,10 +32,11 @@ def timed(once: Callable[[], Any]) -> Any:
 
 def answer(package: str, seconds: dict[str, Any], **found: Any) -> None:
     """Write what was found beside the job, with the version of the package."""
-    text = {"version": f"{package} {version(package)}", **seconds, **found}
-    Path(sys.argv[1]).with_suffix(".answer").write_text(
-        json.dumps(text, default=lambda values: np.asarray(values).tolist())
-    )
+    told = {"version": f"{package} {version(package)}", **seconds, **found}
+    file = Path(sys.argv[1]).with_suffix(".answer")
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps(told, default=lambda values: np.asarray(values).tolist()))
+    part.replace(file)
 
 
 def routes(package: str, travel_time: Callable[[str, int], float]) -> None:

@@ -1,6 +1,7 @@
 """The problems that peers are given, as files that each of them can read, and how their answers are judged."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,14 @@ HOURS, START, GOAL = 97, (18.06, 37.95), (18.44, 38.05)
 """The times of the file of gyres that swing, and the ends of the route."""
 
 
+@contextmanager
+def whole(file: Path) -> Iterator[Path]:
+    """Where to write, so that `file` is there only when it is written to its end."""
+    part = file.with_name(f"part-{file.name}")
+    yield part
+    part.replace(file)
+
+
 def make(name: str, currents: Path, folder: Path) -> Made:
     """The job of a problem, and what judges the answers to it."""
     (folder / "problems").mkdir(exist_ok=True)
@@ -45,8 +54,8 @@ def drift(currents: Path, folder: Path) -> Made:
     """Particles of fixed depth in the real file: where they are after six hours."""
     import xarray as xr
 
-    starts, twice = folder / "starts.csv", folder / "drift" / "twice.nc"
-    if not starts.exists():
+    starts, twice = folder / "starts.csv", folder / "twice.nc"
+    if not (starts.exists() and twice.exists()):
         data = xr.open_dataset(currents).load()
         water = np.isfinite(data["uo"].values[0]).all(axis=0, where=(data["depth"].values < 200.0)[:, None, None])
         near = range(-AROUND, AROUND + 1)
@@ -61,16 +70,17 @@ def drift(currents: Path, folder: Path) -> Made:
         at = random.uniform(-0.5, 0.5, (2, PARTICLES)) * np.array([[lon[1] - lon[0]], [lat[1] - lat[0]]])
         depth = random.uniform(1.0, DEEPEST, PARTICLES)
         table = np.column_stack([lon[column[cell]] + at[0], lat[row[cell]] + at[1], depth])
-        np.savetxt(starts, table, "%.9f", ",", header="lon,lat,depth", comments="")
+        with whole(starts) as part:
+            np.savetxt(part, table, "%.9f", ",", header="lon,lat,depth", comments="")
         later = data.assign_coords(time=data["time"] + np.timedelta64(1, "D"))
-        twice.parent.mkdir(exist_ok=True)
-        xr.concat([data, later], "time", data_vars="minimal").to_netcdf(twice, engine="h5netcdf")
+        with whole(twice) as part:
+            xr.concat([data, later], "time", data_vars="minimal").to_netcdf(part, engine="h5netcdf")
     job = {"starts": str(starts), "currents": str(currents), "twice": str(twice), "runs": RUNS}
     return job | {"lasting_s": LASTING, "step_s": STEP}, _judge_drift
 
 
 def _judge_drift(answers: dict[str, dict[str, Any]]) -> Measure:
-    ours = answers.get("drift_glider_stream.py", {})
+    ours = answers.get("glider-stream", {})
 
     def measure(found: dict[str, Any]) -> dict[str, Any]:
         evaluations = PARTICLES * LASTING / STEP * 4
@@ -117,24 +127,29 @@ def surface(name: str, folder: Path) -> Made:
             "latitude": ("latitude", lat, {"units": "degrees_north", "standard_name": "latitude"}),
             "longitude": ("longitude", lon, {"units": "degrees_east", "standard_name": "longitude"}),
         }
-        xr.Dataset(fields, axes).to_netcdf(file, engine="h5netcdf")
+        with whole(file) as part:
+            xr.Dataset(fields, axes).to_netcdf(part, engine="h5netcdf")
     scenario = read_scenario("ionian", _settings(file, swings))
     problem = scenario.problem()
     speed = float(problem.evaluator.polar.best_horizontal.max())
     known = bound(problem, 2)
     job = {"file": str(file), "runs": RUNS, "speed": speed, "start": START, "goal": GOAL}
     job |= {"settings": _settings(file, swings), "swings": swings}
-    own = {"least_s": known.least, "arrival_s": known.time}
+    own = {"arrival_s": known.time, "error_s": known.error}
 
     def judge(answers: dict[str, dict[str, Any]]) -> Measure:
-        level = answers.get("route_level_set.py", {})
+        level = answers.get("hj_reachability", {})
 
         def measure(found: dict[str, Any]) -> dict[str, Any]:
             result = {"told_s": found["route_s"], "our_level_set": own}
             flown = _flown(found["way"], speed, swings) if "way" in found else found["route_s"]
             result |= {"route_s": flown}
             if "route_s" in level:
-                result["over_level_set"] = flown / level["route_s"]
+                least = level["route_s"]
+                result |= {
+                    "over_level_set": flown / least,
+                    "level_set_error": abs(level["coarser_s"] / least - 1.0),
+                }
             return result
 
         return measure
@@ -184,7 +199,8 @@ def legs(name: str) -> Made:
             assert reference.seconds is not None
             over = None if known["median"] is None else known["median"] / reference.seconds
             found_of = f"{sum(np.isfinite(times))} of {len(times)}"
-            return {"routes_s": known, "found": found_of, "over_level_set": over}
+            told = {"reference_s": reference.seconds, "bound_s": reference.bound}
+            return {"routes_s": known, "found": found_of, "over_level_set": over, **told}
 
         return measure
 

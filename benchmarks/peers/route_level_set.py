@@ -2,7 +2,8 @@
 
 V(., 0) is the time tau [s] that the vehicle needs from the start in still water, without a tip: a front begun
 within tau arrives at t. From the start itself it takes t + tau / (1 + m / speed) at least, m the greatest current
-there. Grids of 500 and 250 m; the goal's value is cubic between nodes.
+there. Grids of 500 and 250 m; tau [s] is 12 times that, so their difference tells the error of the start too;
+the goal's value is cubic between nodes.
 """
 
 import math
@@ -18,7 +19,7 @@ from hj_reachability.boundary_conditions import extrapolate_away_from_zero
 from problems_gyre import gyres, to_lonlat, to_metres
 from scipy.ndimage import map_coordinates
 
-SPEED, SOFT, TAU, STEP = JOB["speed"], 3000.0, 6000.0, 600.0
+SPEED, STEP = JOB["speed"], 600.0
 LOW, HIGH = np.array([-24_000.0, -14_000.0]), np.array([24_000.0, 14_000.0])
 
 
@@ -40,6 +41,7 @@ class Vehicle(hj.dynamics.Dynamics):
 
 
 def arrival(spacing):
+    tau, soft = 12.0 * spacing, 6.0 * spacing
     shape = tuple(int(n) for n in 1 + (HIGH - LOW) / spacing)
     sides = (extrapolate_away_from_zero,) * 2
     grid = hj.Grid.from_lattice_parameters_and_boundary_conditions(hj.sets.Box(LOW, HIGH), shape, sides)
@@ -49,19 +51,19 @@ def arrival(spacing):
     lon, lat = to_lonlat(nodes[..., 0], nodes[..., 1])
     start, goal = np.array(to_metres(*JOB["start"])), np.array(to_metres(*JOB["goal"]))
     still = np.linalg.norm(nodes - start, axis=-1) / SPEED
-    near = np.hypot(*(one[still < TAU] for one in gyres(lon, lat, 0.0, JOB["swings"]))).max()
-    vehicle, values, now, left = Vehicle(), jnp.asarray(np.hypot(still, SOFT) - SOFT), 0.0, math.inf
+    near = np.hypot(*(one[still < tau] for one in gyres(lon, lat, 0.0, JOB["swings"]))).max()
+    vehicle, values, now, left = Vehicle(), jnp.asarray(np.hypot(still, soft) - soft), 0.0, math.inf
     settings = hj.SolverSettings.with_accuracy("very_high")
-    while left > TAU:
+    while left > tau:
         uv = np.stack(gyres(lon, lat, now + STEP / 2, JOB["swings"]), axis=-1)
         moving = grid.replace(states=jnp.concatenate([grid.states, jnp.asarray(uv)], axis=-1))
         values = hj.step(settings, vehicle, moving, now, values, now + STEP, progress_bar=False)
         place = ((goal - LOW) / (HIGH - LOW) * (np.array(shape) - 1))[:, None]
         value = float(map_coordinates(np.asarray(values, float), place, mode="nearest")[0])
-        before, left = left, math.sqrt(max(value + SOFT, SOFT) ** 2 - SOFT**2)
+        before, left = left, math.sqrt(max(value + soft, soft) ** 2 - soft**2)
         now += STEP
-    touched = now - STEP * (TAU - left) / (before - left)
-    return touched + TAU / (1.0 + near / SPEED)
+    touched = now - STEP * (tau - left) / (before - left)
+    return touched + tau / (1.0 + near / SPEED)
 
 
 coarse = arrival(500.0)

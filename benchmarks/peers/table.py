@@ -5,6 +5,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import compare
+
 Row = dict[str, Any]
 
 
@@ -22,7 +24,7 @@ def _drift(row: Row) -> list[str]:
     ends = row.get("metres_from_ours", {"median": math.nan, "most": math.nan})
     return [
         f"{rate['median']:.3g} million/s ({rate['low']:.3g} to {rate['high']:.3g})",
-        f"{ends['median']:.2g} m, {ends['most']:.2g} m",
+        f"{ends['median']:.3g} m, {ends['most']:.3g} m",
     ]
 
 
@@ -38,7 +40,7 @@ def _legs(row: Row) -> list[str]:
     middle, low, high = (_or_none(row["routes_s"][key], ",.0f") for key in ("median", "low", "high"))
     return [
         row["found"],
-        f"{middle} s ({low} to {high})",
+        f"{middle}{' s' * (middle != 'none')} ({low} to {high})",
         _or_none(row["over_level_set"], ".3f"),
         _seconds(row["processor_s"]),
     ]
@@ -58,7 +60,7 @@ SHAPES: dict[str, tuple[tuple[str, ...], Any]] = {
 def of_problem(rows: list[Row]) -> str:
     """One problem's table."""
     heads, cells = SHAPES[_kind(rows[0]["problem"])]
-    head = ["peer", "version", *heads, "lines"]
+    head = ["peer", "version", *heads, "lines of code"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in rows:
         if "failed" in row:
@@ -68,7 +70,35 @@ def of_problem(rows: list[Row]) -> str:
         else:
             told = [row["peer"], row["version"].split()[-1], *cells(row), str(row["lines"])]
             lines.append("| " + " | ".join(told) + " |")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_reference(rows)])
+
+
+def _reference(rows: list[Row]) -> list[str]:
+    """What the ratios are over, and how well it is known."""
+    row: Row = next((one for one in rows if "level_set_error" in one or "reference_s" in one), {})
+    if "level_set_error" in row:
+        own = row["our_level_set"]
+        times = [f"{own[key] / 3600:.2f}" for key in ("arrival_s", "error_s")]
+        return [
+            "",
+            f"The level set is known within {100 * row['level_set_error']:.2g} %, by its two grids. "
+            f"This project's own level set says {times[0]} h, within {times[1]} h.",
+        ]
+    if "reference_s" in row:
+        return [
+            "",
+            f"The reference is {row['reference_s']:,.1f} s; no route takes less than {row['bound_s']:,.1f} s.",
+        ]
+    return []
+
+
+def answered(rows: list[Row]) -> str:
+    """On every problem: the fastest peer, and our time over its."""
+    lines = ["| problem | the fastest peer | our time over its | no slower than it |", "|---|---|---|---|"]
+    for problem, row, over in compare.beside_ours(rows):
+        verdict = "yes" if over <= 1.0 + compare.TOLERANCE else "no"
+        lines.append(f"| {problem} | {row['peer']} | {over:.3f} | {verdict} |")
+    return "\n".join([*lines, "", compare.answer(rows)])
 
 
 def known(rows: list[Row]) -> str:
@@ -83,6 +113,7 @@ def rewrite(document: Path, record: dict[str, Any]) -> None:
     """Write every table between its marks anew: `<!-- table NAME -->` and `<!-- end -->`."""
     rows = record["rows"]
     tables = {"peers": known(rows), "machine": f"Measured on: {record['machine']}."}
+    tables["answer"] = answered(rows)
     for problem in dict.fromkeys(row["problem"] for row in rows):
         tables[problem] = of_problem([row for row in rows if row["problem"] == problem])
     text = document.read_text()

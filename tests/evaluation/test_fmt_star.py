@@ -1,6 +1,7 @@
 """FMT*: the march beside Dijkstra's search, the radius of the paper, routes beside closed forms."""
 
 import math
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -97,6 +98,8 @@ def test_ways_around_a_disk_are_little_longer_than_the_shortest():
 
 def test_ways_around_a_disk_are_as_long_as_those_of_ompl():
     base = pytest.importorskip("ompl.base", reason="OMPL is not installed")
+    if version("ompl").startswith("1."):
+        pytest.skip("OMPL 1 takes no plain functions; 2.0.1 does")
     from ompl.geometric import FMT
 
     theirs = []
