@@ -34,8 +34,8 @@ UNTRIED = "not tried: no leg leaves any of the nodes that were asked"
 class StepError:
     """The greatest distance `off` [m] between the ends of `legs` legs in steps of `dt` [s] and in finer steps.
 
-    On a ladder a step lasts `longest` [s] at most. Bends of currents between levels move no end by more than `bound`
-    [m], a side of a cell by no more than `kink` [m].
+    On a ladder a step lasts `longest` [s] at most. Bends of currents between levels move no end by more than
+    `bound` [m], a side of a cell by no more than `kink` [m].
     """
 
     off: float
