@@ -56,6 +56,8 @@ def rates() -> dict[str, float]:
     start, end = rng.uniform(-450, 450, (FLIGHTS, 2)), np.empty(FLIGHTS)
     found = {}
     for name, flow in (("four times", changing), ("one time", steady)):
+        if hasattr(flow, "ladder"):  # an older checkout has none
+            flow = flow._replace(ladder=flow.ladder._replace(longest=0.0))
         _fly(flow, start, end, 0, 1)
         began = time.process_time()
         _fly(flow, start, end, 0, FLIGHTS)

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from .cache import entry_point, inlined, kernel, making
 from .control import angle_of_vertical_speed, control_towards, vertical_speed
 from .flight import FLIGHT_ROWS, LANE_LEFT, advance, fly_to, hangar, place, rest
-from .flow import Array, Numbers, max_rise, rises
+from .flow import Array, Numbers, cell_size, max_rise, rises
 from .motion import LANE_T, LANE_W, LANE_X, LANE_Y, LANE_Z, LANES
 from .patch import (
+    BENT,
+    BENT_SHARE,
     LANDING_COLUMNS,
     MAX_LEVELS,
     Cell,
@@ -64,13 +66,14 @@ class FlowMap(NamedTuple):
 class Launch(NamedTuple):
     """The place and time at which the controls of a fan start, their direction, and their steps `dt` [s].
 
-    In a flow that rises a control flies for `longest` [s] at most.
+    In a flow that rises a control flies for `longest` [s] at most. `use`: on which ladder, if the flow has two.
     """
 
     origin: Place
     direction: int
     dt: float
     longest: float
+    use: int
 
 
 class Sweep(NamedTuple):
@@ -110,7 +113,10 @@ class Mesh(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What a look into the cells of a fan needs; `patches` (3, 6, 3) and `corners` (CORNERS,) are scratch."""
+    """What a look into the cells of a fan needs; `patches` (3, 6, 3) and `corners` (CORNERS,) are scratch.
+
+    A cell that is bent by more than `bent` [m] is halved.
+    """
 
     nodes: Nodes
     sweep: Sweep
@@ -118,6 +124,7 @@ class Look(NamedTuple):
     mesh: Mesh
     patches: Array
     corners: Numbers
+    bent: float
 
 
 @kernel
@@ -195,7 +202,7 @@ def _launch(medium, launch, heights, vertex, one, lanes, n):
     place(lanes, n, launch.origin, c)
     lanes[FAN_VERTEX, n], lanes[FAN_LEVEL, n] = one, 0.0
     time = (heights[0] - launch.origin.z) / c.w
-    fly_to(medium.flow, lanes, n, heights[0], time, launch.longest, launch.dt)
+    fly_to(medium.flow, lanes, n, heights[0], time, launch.longest, launch.dt, launch.use)
 
 
 @kernel
@@ -228,7 +235,7 @@ def land_on_levels(medium, launch, heights, vertex, landing, first, last, lanes)
                 lanes[FAN_LEVEL, n] = level + 1
                 time = (heights[level + 1] - heights[level]) / lanes[LANE_W, n]
                 left = max(launch.longest - since, launch.dt)
-                fly_to(medium.flow, lanes, n, heights[level + 1], time, left, launch.dt)
+                fly_to(medium.flow, lanes, n, heights[level + 1], time, left, launch.dt, launch.use)
             elif following < last:
                 _launch(medium, launch, heights, vertex, following, lanes, n)
                 following += 1
@@ -371,7 +378,7 @@ def look_into_quarter(look, cell, quarter, may_halve, rows, count):
                 continue
             if landed < 4 and not complete_patches(look, quarter, k):
                 continue
-        if may_halve and wants_halving(look.nodes, levels.layer[k], look.patches):
+        if may_halve and wants_halving(look.nodes, levels.layer[k], look.patches, look.bent):
             bent |= 1 << k
             continue
         slab = Slab(levels.layer[k], levels.height[k - 1] if k > 0 else z, levels.height[k])
@@ -440,6 +447,7 @@ def fan_guesses(medium, steering, nodes, sweep, guesses, lanes):
     patches, corners = np.empty((3, 6, 3)), np.empty(CORNERS, np.int64)
     waiting = coarsest_cells(medium, nodes.bins, sweep, levels, mesh, cells)
     done, vertices, generation = 0, 0, 0
+    bent = max(BENT, BENT_SHARE * cell_size(medium.flow))
     while done < waiting:
         most = vertices + CORNERS * (waiting - done)
         vertex, landing = longer(mesh.vertex, most), longer(mesh.landing, most)
@@ -448,7 +456,7 @@ def fan_guesses(medium, steering, nodes, sweep, guesses, lanes):
         for c in range(done, waiting):
             vertices = add_vertices(mesh, cells[c], new, vertices)
         land_on_levels(medium, launch, levels.height, vertex, landing, new, vertices, lanes)
-        look = Look(nodes, sweep, levels, mesh, patches, corners)
+        look = Look(nodes, sweep, levels, mesh, patches, corners, bent)
         first, done = done, waiting
         may_halve = generation < steering.generations
         cells, waiting, guesses = look_into_cells(look, cells, first, done, may_halve, guesses)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .cache import in_kernels, inlined, kernel, making
-from .flow import Array, Flow, by_rise, contains_box, rises
+from .flow import LEGS, Array, Flow, by_rise, contains_box, has_ladder, rises, step_to_rung
 from .motion import (
     LANE_ROWS,
     LANE_STEP,
@@ -18,22 +18,26 @@ from .motion import (
     LANE_Z,
     LANES,
     landing_in_step,
+    most_step,
     rising_lanes,
     rk4_lanes,
 )
 from .place import Pair, Place, Velocity
 from .terrain import open_in_box
 
-_ROWS = range(LANE_ROWS, LANE_ROWS + 20)
+_ROWS = range(LANE_ROWS, LANE_ROWS + 22)
 LANE_LEFT, LANE_LAST = _ROWS[:2]
-"""Rows of a lane beyond `motion`'s: steps that are left, and the length of the last one [s]."""
+"""Rows of a lane beyond `motion`'s: steps that are left, and the length of the last one [s]; on a ladder 1, and
+the time that is left [s]."""
 LANE_X_LO, LANE_X_HI, LANE_Y_LO, LANE_Y_HI = _ROWS[2:6]
 """The box [m] about the places that `widen` has seen."""
 START_X, START_Y, START_Z, START_T, GOAL_X, GOAL_Y, GOAL_Z, GOAL_T = _ROWS[6:14]
 """The ends of the flight's leg, where it has one: `keep_ends` writes them, `ends_of` reads them."""
 LANE_TO, LANE_WAY = _ROWS[14:16]
 """The height [m] at which a flight in a flow that rises ends, and the way there: 1 up, -1 down, 0 for none."""
-_BEFORE_X, _BEFORE_Y, _BEFORE_Z, _BEFORE_T = _ROWS[16:]
+_BEFORE_X, _BEFORE_Y, _BEFORE_Z, _BEFORE_T = _ROWS[16:20]
+_LONGEST, _USE = _ROWS[20:]
+"""Of a flight on a ladder: its longest step [s], and which ladder it uses."""
 FLIGHT_ROWS = _ROWS.stop
 
 
@@ -79,8 +83,8 @@ def fly_for(lanes, n, duration, dt):
 
 
 @inlined
-def fly_to(flow, lanes, n, height, duration, longest, dt):
-    """Let lane n fly until it reaches a height [m], in steps of `dt` [s], and a shorter last step.
+def fly_to(flow, lanes, n, height, duration, longest, dt, use=LEGS):
+    """Let lane n fly until it reaches a height [m], in steps of `dt` [s] and a shorter last step, or on a ladder.
 
     That takes a `duration` [s] where the flow has no vertical part; below 0 it flies back in time. In a flow that
     rises the lane ends where its path crosses the height, or after `longest` [s], with NaN as its place.
@@ -90,6 +94,10 @@ def fly_to(flow, lanes, n, height, duration, longest, dt):
         lanes[LANE_LAST, n] = lanes[LANE_STEP, n] = math.copysign(dt, duration)
         lanes[LANE_TO, n] = height
         lanes[LANE_WAY, n] = 1.0 if height > lanes[LANE_Z, n] else -1.0
+    elif has_ladder(flow):
+        most = most_step(flow, dt) if use == LEGS else dt
+        lanes[LANE_LEFT, n], lanes[LANE_LAST, n], lanes[_LONGEST, n], lanes[_USE, n] = 1.0, duration, most, use
+        lanes[LANE_STEP, n] = step_to_rung(flow, use, lanes[LANE_Z, n], lanes[LANE_W, n], duration, most)
     else:
         fly_for(lanes, n, duration, dt)
 
@@ -112,6 +120,23 @@ def _count_down(flat):
         )
 
 
+@inlined
+def _climb(flow, lanes):
+    """Choose the next step of every lane on the flow's ladder; a lane without a step is at rest."""
+    for n in range(LANES):
+        step = lanes[LANE_STEP, n]
+        if step == 0.0:
+            continue
+        left = lanes[LANE_LAST, n] - step
+        lanes[LANE_LAST, n] = left
+        if left == 0.0:
+            lanes[LANE_LEFT, n], lanes[LANE_STEP, n] = 0.0, 0.0
+        else:
+            use = np.uintp(lanes[_USE, n])
+            z, w, most = lanes[LANE_Z, n], lanes[LANE_W, n], lanes[_LONGEST, n]
+            lanes[LANE_STEP, n] = step_to_rung(flow, use, z, w, left, most)
+
+
 def advance(flow: Flow, lanes: Array) -> None:
     """Make one RK4 step of every lane in flight; a lane whose LANE_LEFT is 0 has ended."""
     _ADVANCE[rises(flow)](flow, lanes)
@@ -119,7 +144,10 @@ def advance(flow: Flow, lanes: Array) -> None:
 
 def _advance_level(flow, lanes):
     rk4_lanes(flow, lanes)
-    _count_down(lanes.reshape(-1))
+    if has_ladder(flow):
+        _climb(flow, lanes)
+    else:
+        _count_down(lanes.reshape(-1))
 
 
 def _advance_rising(flow, lanes):
@@ -159,6 +187,13 @@ def widen(lanes):
         x, y = lanes[LANE_X, n], lanes[LANE_Y, n]
         lanes[LANE_X_LO, n], lanes[LANE_X_HI, n] = min(lanes[LANE_X_LO, n], x), max(lanes[LANE_X_HI, n], x)
         lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n] = min(lanes[LANE_Y_LO, n], y), max(lanes[LANE_Y_HI, n], y)
+
+
+@kernel
+def stretch(lanes, n, margin):
+    """Extend the box of lane n by a margin [m] on all sides."""
+    lanes[LANE_X_LO, n], lanes[LANE_X_HI, n] = lanes[LANE_X_LO, n] - margin, lanes[LANE_X_HI, n] + margin
+    lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n] = lanes[LANE_Y_LO, n] - margin, lanes[LANE_Y_HI, n] + margin
 
 
 @kernel

@@ -21,6 +21,13 @@ JUST_BELOW = 1.0 - 2.0**-52
 ROUNDING = 1e-9
 """A quick look at a box is this much stricter, in grid indices, than a look at a place, which is rounded."""
 
+ON_RUNG = 1e-6
+"""A flight that is this near [m] to a rung has reached it."""
+NEARLY = 1.0 + 1e-6
+"""A flight whose end lies beyond the next rung by less than this share of a step ends with that step."""
+LEGS, FANS = 0, 1
+"""The two ladders of a flow."""
+
 Array = NDArray[np.float64]
 Index = NDArray[np.uintp]
 Slot = tuple[np.uintp, float]
@@ -43,6 +50,24 @@ class Extent(NamedTuple):
     t_hi: float
     max_speed: float
     length_scale: float
+
+
+class Ladder(NamedTuple):
+    """The heights at which steps end in a file's currents, its rungs: between them the currents bend little.
+
+    `rungs` (2, levels + 1, 2) [m]: for legs, and for fans; from below the lowest level, above it, ..., above the
+    last one: the next rung downward and upward. A step of a leg lasts `longest` [s] at most; 0 where there is no
+    ladder, and steps are even. The bends that its steps pass over move a leg's end by `shift` [m^2/s] over its
+    vertical speed at most.
+    """
+
+    rungs: Array
+    longest: float
+    shift: float
+
+
+NO_LADDER = Ladder(np.zeros((2, 0, 2)), 0.0, 0.0)
+"""The ladder of a flow in which all steps are even."""
 
 
 class Uniform(NamedTuple):
@@ -157,6 +182,7 @@ class OceanGrid(NamedTuple):
     index_map: Array
     per_x: float
     per_y: float
+    ladder: Ladder
     extent: Extent
 
 
@@ -529,6 +555,31 @@ def _none(flow):
     return 0.0
 
 
+def _has_ladder(flow):
+    return flow.ladder.longest > 0.0
+
+
+def _no_step(flow, use, z, w, left, longest):
+    return left
+
+
+def _step_to_rung(flow, use, z, w, left, longest):
+    levels, way = flow.levels, w * left
+    beyond = z + math.copysign(ON_RUNG, way)
+    below, _ = _slot(beyond, levels, flow.level_slot, flow.slots_per_z)
+    layer = below + np.uintp(1)
+    layer = layer if beyond >= levels[0] else np.uintp(0)
+    layer = layer if beyond < levels[np.uintp(levels.size - 1)] else np.uintp(levels.size)
+    span = abs((flow.ladder.rungs[use, layer, np.uintp(1 if way > 0.0 else 0)] - z) / w)
+    span = abs(left) if abs(left) <= span * NEARLY else span
+    span = span if span <= longest else span / math.ceil(span / longest)
+    return math.copysign(span, left)
+
+
+def _own_longest(flow):
+    return flow.ladder.longest
+
+
 def _max_rise(flow):
     return flow.max_rise
 
@@ -577,6 +628,9 @@ class Abilities(NamedTuple):
     on_times: Callable[..., Any] = _on_none
     at_index: Callable[..., Any] = _not_at_index
     at_index_once: Callable[..., Any] = _not_at_index_once
+    has_ladder: Callable[..., Any] = _no
+    step_to_rung: Callable[..., Any] = _no_step
+    longest_step: Callable[..., Any] = _none
 
 
 def _rising(current: Callable[..., Any], **others: Callable[..., Any]) -> Abilities:
@@ -605,6 +659,9 @@ ABILITIES: dict[type, Abilities] = {
         on_times=_on_times,
         at_index=_at_index,
         at_index_once=_at_index_once,
+        has_ladder=_has_ladder,
+        step_to_rung=_step_to_rung,
+        longest_step=_own_longest,
     ),
     Upwelling: _rising(_upwelling),
     Rolls: _rising(_rolls, cycle=_rolls_cycle),
@@ -676,6 +733,25 @@ def at_index_once(flow: Flow, at_i: float, at_j: float, level: Slot) -> tuple[fl
     return ABILITIES[type(flow)].at_index_once(flow, at_i, at_j, level)
 
 
+def has_ladder(flow: Flow) -> bool:
+    """Return whether steps end at the flow's own heights; see `Ladder`."""
+    return ABILITIES[type(flow)].has_ladder(flow)
+
+
+def step_to_rung(flow: Flow, use: Any, z: float, w: float, left: float, longest: float) -> float:
+    """Return the next step [s] of a flight at z [m] with w [m/s] and `left` [s] to go, on a flow's ladder.
+
+    Of the ladder for LEGS or FANS. What takes longer than `longest` [s] is cut into equal steps. Below 0 where
+    `left` is.
+    """
+    return ABILITIES[type(flow)].step_to_rung(flow, use, z, w, left, longest)
+
+
+def longest_step(flow: Flow) -> float:
+    """Return the longest step [s] of a leg on the flow's ladder; 0 without a ladder."""
+    return ABILITIES[type(flow)].longest_step(flow)
+
+
 def contains(flow: Flow, x: float, y: float, t: float) -> bool:
     """Return whether the flow is known at (x, y) [m] and time t [s]."""
     return ABILITIES[type(flow)].contains(flow, x, y, t)
@@ -699,7 +775,8 @@ def carry(flow: Flow, z: float) -> float:
 
 _PUBLIC = (velocity, current, rises, max_rise, contains, contains_box, carry)
 _ON_MAPS = (cell_size, is_mapped, has_one_time, index_on_map, on_levels, on_times, at_index, at_index_once)
-for _ability in (*_PUBLIC, *_ON_MAPS):
+_ON_LADDERS = (has_ladder, step_to_rung, longest_step)
+for _ability in (*_PUBLIC, *_ON_MAPS, *_ON_LADDERS):
     in_kernels(_ability, {kind: getattr(can, _ability.__name__) for kind, can in ABILITIES.items()})
 
 
@@ -719,9 +796,30 @@ def cycle(flow: Flow) -> float:
     return ABILITIES[type(flow)].cycle(flow)
 
 
+def ladder_in(flow: Flow) -> Ladder:
+    """Return the ladder of a flow, or NO_LADDER."""
+    ladder: Ladder = getattr(flow, "ladder", NO_LADDER)
+    return ladder
+
+
+def on_even_steps(flow: Flow) -> Flow:
+    """Return the flow without a ladder."""
+    return flow._replace(ladder=NO_LADDER) if isinstance(flow, OceanGrid) else flow
+
+
+def same_steps(flow: Flow, other: Flow) -> bool:
+    """Return whether legs in two flows have the same steps."""
+    mine, its = ladder_in(flow), ladder_in(other)
+    return mine.longest == its.longest and np.array_equal(mine.rungs, its.rungs)
+
+
 def fields_of(flow: tuple[Any, ...]) -> dict[str, Any]:
-    """Return the fields of a flow or a terrain by name, with the fields of its extent."""
+    """Return the fields of a flow or a terrain by name, with those of its extent, but not its ladder.
+
+    A ladder follows from the values.
+    """
     fields: dict[str, Any] = flow._asdict()  # type: ignore[attr-defined]
+    fields.pop("ladder", None)
     extent = fields.pop("extent", None)
     return fields if extent is None else fields | extent._asdict()
 

@@ -15,15 +15,12 @@ from .control import CLIMB, DIVE, heading_of, horizontal_speed, vertical_speed
 from .edges import BLOCKED, CONNECTED, NO_HIT, no_edge, store
 from .flight import (
     LANE_LEFT,
-    LANE_X_HI,
-    LANE_X_LO,
-    LANE_Y_HI,
-    LANE_Y_LO,
     advance,
     ends_of,
     hangar,
     keep_ends,
     rest,
+    stretch,
     widen,
 )
 from .flow import current, rises
@@ -278,8 +275,7 @@ def _take(medium, lanes, n, leg):
         # between its steps it may have been a little further out
         between = 0.5 * COARSE_STEP * medium.integration.dt
         between *= medium.flow.extent.max_speed + medium.polar.best_horizontal[int(lanes[AIM_DIRECTION, n])]
-        lanes[LANE_X_LO, n], lanes[LANE_X_HI, n] = lanes[LANE_X_LO, n] - between, lanes[LANE_X_HI, n] + between
-        lanes[LANE_Y_LO, n], lanes[LANE_Y_HI, n] = lanes[LANE_Y_LO, n] - between, lanes[LANE_Y_HI, n] + between
+        stretch(lanes, n, between)
     edge = checked_leg(medium, lanes, n)
     if edge.status != CONNECTED and edge.status != BLOCKED:
         return

@@ -7,6 +7,7 @@ import numpy as np
 
 from .cache import entry_point, in_kernels, inlined, kernel, making
 from .flow import (
+    LEGS,
     Flow,
     at_index,
     at_index_once,
@@ -14,12 +15,15 @@ from .flow import (
     carry,
     contains,
     current,
+    has_ladder,
     has_one_time,
     index_on_map,
     is_mapped,
+    longest_step,
     on_levels,
     on_times,
     rises,
+    step_to_rung,
     velocity,
 )
 from .place import Place
@@ -27,6 +31,8 @@ from .terrain import allowed, open_in_box
 
 CROSSED = 1e-7
 """A path has reached a height at this distance [m] from it."""
+STRETCH = 8.0
+"""A step on a flow's ladder lasts so many even steps at most."""
 EMERGED = 1e-3
 """A path has left the water this far [m] above the surface."""
 
@@ -205,20 +211,60 @@ _CLOSEST = (_closest_level, _closest_rising)
 in_kernels(closest_approach, by_rise(*_CLOSEST))
 
 
+@inlined
+def most_step(flow, dt):
+    """Return the longest step [s] of a leg on a flow's ladder, where even steps would last `dt` [s]."""
+    return min(STRETCH * dt, longest_step(flow))
+
+
 @making
-def trace(flow, start, through, duration, dt):
-    """The path as rows [t, x, y, z]: every full step of `dt`, and the last, shorter one to `duration`."""
+def even_steps(duration, dt):
+    """Rows [since the start, length] [s] of full steps of `dt`, and the last, shorter one; then the end and 0."""
     full = int(duration / dt)
-    rows = np.empty((full + 2 if full * dt < duration else full + 1, 4))
+    steps = np.empty((full + 2 if full * dt < duration else full + 1, 2))
+    for n in range(steps.shape[0]):
+        since = min(n * dt, duration)
+        steps[n] = (since, min(dt, duration - since))
+    return steps
+
+
+@making
+def steps_of(flow, z, w, duration, dt):
+    """The steps of a leg from z [m] with w [m/s], as rows of `even_steps`; on the flow's ladder if it has one."""
+    if not has_ladder(flow):
+        return even_steps(duration, dt)
+    longest, left, count = most_step(flow, dt), duration, 1
+    while left > 0.0:
+        left -= step_to_rung(flow, LEGS, z + (duration - left) * w, w, left, longest)
+        count += 1
+    steps, left = np.empty((count, 2)), duration
+    for n in range(count - 1):
+        since = duration - left
+        steps[n] = (since, step_to_rung(flow, LEGS, z + since * w, w, left, longest))
+        left -= steps[n, 1]
+    steps[count - 1] = (duration, 0.0)
+    return steps
+
+
+@making
+def path_in(flow, start, through, steps):
+    """The path in some steps, of `steps_of` or `even_steps`, as rows [t, x, y, z]."""
+    rows = np.empty((steps.shape[0], 4))
     x, y, z = start.x, start.y, start.z
     for n in range(rows.shape[0]):
-        since = min(n * dt, duration)
+        since, step = steps[n]
         if not rises(flow):
             z = start.z + since * through.w
         here = Place(x, y, z, start.t + since)
         rows[n] = (here.t, x, y, z)
-        x, y, z = step_on(flow, here, through, min(dt, duration - since))
+        x, y, z = step_on(flow, here, through, step)
     return rows
+
+
+@making
+def trace(flow, start, through, duration, dt):
+    """The path as rows [t, x, y, z]: after every step of a leg, to `duration`."""
+    return path_in(flow, start, through, steps_of(flow, start.z, through.w, duration, dt))
 
 
 @entry_point()
@@ -229,8 +275,8 @@ def traced(flow, start, through, duration, dt):
 
 @making
 def stays_inside(flow, start, through, duration, dt):
-    """Return whether each step of the leg begins where the flow is known."""
-    rows = trace(flow, start, through, duration, dt)
+    """Return whether each even step of the leg begins where the flow is known."""
+    rows = path_in(flow, start, through, even_steps(duration, dt))
     inside = True
     for n in range(rows.shape[0] - 1):
         t, x, y, _ = rows[n]
@@ -247,7 +293,7 @@ def is_clear(flow, terrain, start, through, duration, dt, spacing):
     z_end = start.z + through.w * duration
     if not rises(flow) and open_in_box(terrain, -math.inf, math.inf, -math.inf, math.inf, min(start.z, z_end)):
         return True
-    rows = trace(flow, start, through, duration, dt)
+    rows = path_in(flow, start, through, even_steps(duration, dt))
     for n in range(rows.shape[0] - 1):
         _, ax, ay, az = rows[n]
         _, bx, by, bz = rows[n + 1]

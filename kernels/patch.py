@@ -22,6 +22,9 @@ ALONG_ANGLE, ALONG_HEADING = 4, 5
 where a landing beyond the patch is missing."""
 BENT = 8.0
 """A cell whose middle lies this far [m] from its linear image is halved."""
+BENT_SHARE = 0.005
+"""In a file's grid it may lie as far as this share of a cell of the file: guesses know the bend, and in a part of
+such a cell it hardly changes."""
 MARGIN = 0.35
 """A target this far outside a triangle, in its own units, is a guess where none is inside."""
 BESIDE_LANDED = 50.0
@@ -245,11 +248,11 @@ def _folded(p):
 
 
 @kernel
-def wants_halving(nodes, layer, patches):
-    """Whether a patch that is bent or folded has a wanted node within the bend's or the fold's reach."""
+def wants_halving(nodes, layer, patches, bent):
+    """Whether a patch that is bent by more than `bent` [m] or folded has a wanted node within reach of that."""
     bend = _bend(patches[0])
     folded = _folded(patches[0])
-    if bend <= BENT and not folded:
+    if bend <= bent and not folded:
         return False
     box = _around(nodes.bins, patches)
     room = max(bend, 0.25 * max(box.x_hi - box.x_lo, box.y_hi - box.y_lo)) if folded else bend

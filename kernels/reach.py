@@ -23,9 +23,9 @@ from .edges import (
     store,
 )
 from .fan import FAN_ROWS, Launch, Sweep, fan_guesses, outward_of
-from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, stayed_open, widen
-from .flow import Array, Numbers, cell_size, contains, rises
-from .motion import LANES, is_clear, stays_inside
+from .flight import LANE_LEFT, advance, ends_of, hangar, rest, stayed_inside, stayed_open, stretch, widen
+from .flow import FANS, Array, Numbers, cell_size, contains, has_ladder, rises
+from .motion import LANES, is_clear, most_step, stays_inside
 from .patch import (
     GUESS_ANGLE,
     GUESS_COLUMNS,
@@ -61,6 +61,8 @@ FAN_STEP = 8.0
 guesses."""
 FAN_SHARE = 0.125
 """In a file's grid a fan's step may last as long as the fastest glider takes for this share of a cell."""
+LADDER_SHARE = 0.25
+"""On a ladder, whose rungs lie where the currents bend, for this share."""
 SPARE, LONGER = 1.3, 1.2
 """A deadline should suffice for SPARE times the limit; each is at least LONGER times the one before."""
 LATEST = 1.1
@@ -134,6 +136,9 @@ def checked_leg(medium, lanes, n):
     flow, dt = medium.flow, medium.integration.dt
     c, time = control_in(medium.polar, lanes, n), lanes[AIM_TIME, n]
     start, goal = ends_of(lanes, n)
+    if has_ladder(flow):
+        # between its steps it may have been further out
+        stretch(lanes, n, 0.5 * most_step(flow, dt) * flow.extent.max_speed)
     if not (contains(flow, start.x, start.y, start.t) and contains(flow, goal.x, goal.y, start.t)):
         return no_edge(NO_HIT)
     if not (stayed_inside(flow, lanes, n, start.t, time) or stays_inside(flow, start, c, time, dt)):
@@ -385,8 +390,9 @@ def launch_of(medium, points, task):
     """Return the fan of a task, with the steps of a fan."""
     origin, direction = place_of(points, int(task[TASK_ORIGIN])), int(task[TASK_DIRECTION])
     fastest = medium.flow.extent.max_speed + medium.polar.best_horizontal[direction]
-    step = max(medium.integration.dt * FAN_STEP, FAN_SHARE * cell_size(medium.flow) / fastest)
-    return Launch(origin, direction, step, FLOWN * task[TASK_DEADLINE])
+    share = LADDER_SHARE if has_ladder(medium.flow) else FAN_SHARE
+    step = max(medium.integration.dt * FAN_STEP, share * cell_size(medium.flow) / fastest)
+    return Launch(origin, direction, step, FLOWN * task[TASK_DEADLINE], FANS)
 
 
 @making

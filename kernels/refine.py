@@ -10,6 +10,7 @@ from .control import direction_of
 from .edges import NO_HIT, STATUS
 from .fan import FAN_ROWS, VERTEX_ANGLE, VERTEX_HEADING, VERTEX_THROUGH, Launch, land_on_levels
 from .flight import hangar
+from .flow import LEGS
 from .patch import (
     GUESS_ANGLE,
     GUESS_COLUMNS,
@@ -115,7 +116,7 @@ def candidate_guesses(medium, steering, pairs, edges, first, last, lanes):
             direction = direction_of(pair)
             tilted(medium.polar, direction, controls, count, vertex)
             level[0] = pair.goal.z
-            launch = Launch(pair.start, direction, medium.integration.dt, FLOWN * horizon_of(medium))
+            launch = Launch(pair.start, direction, medium.integration.dt, FLOWN * horizon_of(medium), LEGS)
             land_on_levels(medium, launch, level, vertex, landing, begin, 3 * count, lanes)
             task = 2 * (n - first) + direction
             guesses = guesses_on_line(vertex, landing, count, pair.goal, task, pairs.target[k], guesses)

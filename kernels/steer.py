@@ -5,13 +5,14 @@ import math
 from .cache import inlined, kernel
 from .control import control_towards, heading_of
 from .flight import FLIGHT_ROWS, START_T, ends_of, fly_to, keep_ends, place, rest
-from .flow import rises
+from .flow import has_ladder, rises
 from .motion import LANE_T, LANE_X, LANE_Y
 
 LANDING_TOLERANCE = 0.009
 """A landing this close to its target [m] is a hit, if it is also within the scenario's tolerance."""
 FIRST_STEP = 3.0
-"""Steps of a guess's first flight, in steps of a leg: where it lands is corrected anyway."""
+"""Steps of a guess's first flight, in steps of a leg: where it lands is corrected anyway. On a ladder
+they are those of a leg."""
 MAX_ITERATIONS = 14
 GIVE_UP = 5
 """A guess is given up if it has not reduced its miss to a quarter by this iteration."""
@@ -46,7 +47,8 @@ def aim(medium, lanes, n, direction, pair, angle, heading):
     lanes[AIM_DIRECTION, n], lanes[AIM_ANGLE, n], lanes[AIM_HEADING, n] = direction, angle, heading
     lanes[AIM_STATE, n], lanes[_ITERATION, n] = OPEN, 0.0
     lanes[AIM_TIME, n] = 0.0
-    take_off(medium, lanes, n, FIRST_STEP * medium.integration.dt)
+    longer = 1.0 if has_ladder(medium.flow) else FIRST_STEP
+    take_off(medium, lanes, n, longer * medium.integration.dt)
 
 
 @inlined
@@ -96,7 +98,8 @@ def correct(medium, lanes, n):
         iteration = iteration if iteration >= 1.0 else 0.0
         lanes[_ITERATION, n] = iteration
         patience = SLOWER
-    if miss <= LANDING_TOLERANCE and miss < integration.tolerance and iteration > 0.0:
+    exact = iteration > 0.0 or has_ladder(medium.flow)
+    if miss <= LANDING_TOLERANCE and miss < integration.tolerance and exact:
         lanes[AIM_HEADING, n] = heading_of(math.cos(lanes[AIM_HEADING, n]), math.sin(lanes[AIM_HEADING, n]))
         lanes[AIM_STATE, n] = HIT
         rest(lanes, n)

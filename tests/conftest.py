@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers import forecasts
 
-from glider_stream.kernels.flow import Extent, OceanGrid
+from glider_stream.kernels.flow import NO_LADDER, Extent, OceanGrid
 from glider_stream.kernels.terrain import OpenWater, Seabed
 from glider_stream.roadmap.builder import warm_up
 from glider_stream.roadmap.evaluator import Evaluator
@@ -115,6 +115,7 @@ def ocean_of():
             index_map=corners,
             per_x=1 / 200.0,
             per_y=1 / 200.0,
+            ladder=NO_LADDER,
             extent=Extent(
                 *(-200.0, 200.0, -200.0, 200.0),
                 *(0.0, 1000.0),

@@ -17,6 +17,7 @@ from ..base.threads import in_parallel, threads
 from ..kernels.cache import entry_point
 from ..kernels.control import control_of
 from ..kernels.flight import FLIGHT_ROWS, advance, fly_for, hangar, place
+from ..kernels.flow import on_even_steps
 from ..kernels.motion import LANE_X, LANE_Y, LANES
 from ..kernels.place import Place
 from ..roadmap.builder import find_edges, node_positions, warm_up
@@ -197,11 +198,11 @@ def file_legs(runs: int, quick: bool, currents: str | Path, ceiling: str | Path 
 
 
 def _file_grids() -> dict[str, Any]:
-    """Return flows on a grid as files have them, of one time and of four."""
+    """Return flows on a grid as files have them, of one time and of four, for even steps."""
     nx, ny, nz = FILE_GRID
     x, y, z = np.linspace(-600, 600, nx), np.linspace(-600, 600, ny), np.linspace(-300, 0, nz)
     u, v = np.random.default_rng(0).uniform(-1, 1, (2, 4, nz, ny, nx))
     return {
-        "one time": grid_flow(x, y, z, u[0], v[0])[0],
-        "four times": grid_flow(x, y, z, u, v, np.linspace(0, 5.0 * STEPS, 4))[0],
+        "one time": on_even_steps(grid_flow(x, y, z, u[0], v[0])[0]),
+        "four times": on_even_steps(grid_flow(x, y, z, u, v, np.linspace(0, 5.0 * STEPS, 4))[0]),
     }

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Bools
 from ..base.settings import require
-from ..kernels.flow import Flow, Grid, OceanGrid, fields_of
+from ..kernels.flow import Flow, Grid, OceanGrid, fields_of, same_steps
 from ..kernels.reach import LATEST
 from ..kernels.terrain import Seabed
 from ..roadmap.builder import node_positions
@@ -96,6 +96,8 @@ class _Lattice:
     def changed(self) -> Bools | None:
         """Return the cells where flow or terrain differ; None if they cannot be compared point by point."""
         found = np.zeros(tuple(self.count), dtype=bool)
+        if not same_steps(*self.flows):
+            return None
         terrains = self.before.evaluator.terrain, self.now.evaluator.terrain
         for before, after in (self.flows, terrains):
             now = fields_of(after)

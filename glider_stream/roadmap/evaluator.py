@@ -37,6 +37,18 @@ class Evaluator:
     integration: IntegrationSettings
     cost: Cost = TravelTime()  # noqa: RUF009  (frozen)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "steering", self.steering.in_flow(self.flow, self.integration.dt * self.integration.steps)
+        )
+        # a method that tries controls one by one counts even steps
+        if self.steering.counts_steps:
+            object.__setattr__(self, "flow", flow.on_even_steps(self.flow))
+
+    def on_even_steps(self) -> "Evaluator":
+        """Return the same evaluator in a flow without a ladder, so that all its steps last `integration.dt`."""
+        return replace(self, flow=flow.on_even_steps(self.flow))
+
     def connect(
         self,
         position: ArrayLike,
@@ -185,7 +197,7 @@ class Evaluator:
         angles, headings = (np.require(a, np.float64, ["C", "W"]) for a in (glide_angle, heading))
         direction = control.CLIMB if height > origin.z else control.DIVE
         horizon = self.integration.dt * self.integration.steps
-        launch = fan.Launch(origin, direction, self.integration.dt, horizon)
+        launch = fan.Launch(origin, direction, self.integration.dt, horizon, flow.LEGS)
         where: Array = fan.landings(self.medium, launch, float(height), angles, headings)
         return where
 

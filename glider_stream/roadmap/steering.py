@@ -4,12 +4,14 @@ A new method needs one class like these and one row of METHODS; no other code de
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from ..base.checks import LONGEST, WIDEST
 from ..base.settings import require
 from ..kernels import connect, control, motion, refine
 from ..kernels.fan import FlowMap
+from ..kernels.flow import Flow, OceanGrid
 
 Connector = Callable[..., None]
 """A kernel that tries pairs one by one, such as those of kernels/connect.py."""
@@ -17,6 +19,9 @@ Connector = Callable[..., None]
 MAX_CANDIDATES = 1_000_000
 """The greatest number of candidate controls of a pair."""
 
+FAN, CALM_FAN = (6, 12), (4, 8)
+"""The coarsest mesh of a fan. Currents of a file that carry nothing over one of its cells within the horizon
+hardly deform a fan, so that there fewer controls suffice."""
 MAX_FAN, MAX_GENERATIONS = 1000, 6
 """The greatest number of angles and headings of a fan, and of generations in which its cells are halved."""
 
@@ -26,6 +31,7 @@ class SurfaceMethod:
     """The paper's baseline: `candidates` controls over the whole control surface are integrated."""
 
     candidates: int
+    counts_steps: ClassVar = True
 
     def __post_init__(self) -> None:
         _check_candidates(self.candidates)
@@ -39,6 +45,10 @@ class SurfaceMethod:
     def kernel(self) -> control.Steering:
         """Return the same settings in the form that the kernels read."""
         return control.Surface(self.candidates)
+
+    def in_flow(self, flow: Flow, horizon: float) -> "SurfaceMethod":
+        """Return the same method: it has no mesh."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -56,6 +66,11 @@ class StreamlineMethod:
         _check_candidates(self.candidates)
 
     @property
+    def counts_steps(self) -> bool:
+        """Whether the closest approach is looked for step by step."""
+        return not self.refine
+
+    @property
     def connector(self) -> Connector:
         """The kernel that tries pairs one by one."""
         kernel: Connector = refine.refine_nodes if self.refine else connect.connect_nodes
@@ -65,22 +80,28 @@ class StreamlineMethod:
         """Return the same settings in the form that the kernels read."""
         return control.Streamline(self.candidates)
 
+    def in_flow(self, flow: Flow, horizon: float) -> "StreamlineMethod":
+        """Return the same method: it has no mesh."""
+        return self
+
 
 @dataclass(frozen=True)
 class FlowMapMethod:
     """Exact steering: finds every connection that exists, by the flow map of each source node.
 
-    `fan` = [glide angles, headings] is the coarsest mesh over the controls of a node. Its cells are halved once,
-    and up to `generations` times more where they are bent or folded, so the result depends little on both
-    settings.
+    `fan` = [glide angles, headings] is the coarsest mesh over the controls of a node; by itself FAN, and CALM_FAN
+    in calm currents of a file. Its cells are halved once, and up to `generations` times more where they are bent
+    or folded, so the result depends little on both settings.
     """
 
-    fan: tuple[int, int] = (6, 12)
+    fan: tuple[int, int] | None = None
     generations: int = 3
+    counts_steps: ClassVar = False
 
     def __post_init__(self) -> None:
-        fits = 2 <= self.fan[0] <= MAX_FAN and 4 <= self.fan[1] <= MAX_FAN
-        require(fits, f"`steering.fan` must be from [2, 4] to [{MAX_FAN}, {MAX_FAN}]; got {list(self.fan)}")
+        angles, headings = self.fan or FAN
+        fits = 2 <= angles <= MAX_FAN and 4 <= headings <= MAX_FAN
+        require(fits, f"`steering.fan` must be from [2, 4] to [{MAX_FAN}, {MAX_FAN}]; got {[angles, headings]}")
         fits = 0 <= self.generations <= MAX_GENERATIONS
         require(fits, f"`steering.generations` must be from 0 to {MAX_GENERATIONS}; got {self.generations}")
 
@@ -91,7 +112,15 @@ class FlowMapMethod:
 
     def kernel(self) -> FlowMap:
         """Return the same settings in the form that the kernels read."""
-        return FlowMap(*self.fan, self.generations)
+        return FlowMap(*(self.fan or FAN), self.generations)
+
+    def in_flow(self, flow: Flow, horizon: float) -> "FlowMapMethod":
+        """Return the same method with the mesh that fits a flow and a horizon [s], if none was chosen."""
+        if self.fan is not None:
+            return self
+        known = flow.extent
+        calm = isinstance(flow, OceanGrid) and known.max_speed * horizon < known.length_scale
+        return replace(self, fan=CALM_FAN if calm else FAN)
 
 
 def _check_candidates(candidates: int) -> None:

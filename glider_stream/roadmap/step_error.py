@@ -9,6 +9,9 @@ import numpy as np
 from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..kernels.edges import CONNECTED, Edge
+from ..kernels.flow import OceanGrid, ladder_in
+from ..kernels.motion import STRETCH
+from ..water.ocean.ladder import kink_shift
 from .problem import Problem
 from .roadmap import BaseRoadmap, Edges, Provenance, in_order
 
@@ -29,12 +32,19 @@ UNTRIED = "not tried: no leg leaves any of the nodes that were asked"
 
 @dataclass(frozen=True)
 class StepError:
-    """The greatest distance `off` [m] between the ends of `legs` legs in steps of `dt` [s] and in finer steps."""
+    """The greatest distance `off` [m] between the ends of `legs` legs in steps of `dt` [s] and in finer steps.
+
+    On a ladder a step lasts `longest` [s] at most. Bends of currents between levels move no end by more than
+    `bound` [m], a side of a cell by no more than `kink` [m].
+    """
 
     off: float
     legs: int
     dt: float
     tolerance: float
+    longest: float = 0.0
+    bound: float = 0.0
+    kink: float = 0.0
 
     def check(self) -> None:
         """Raise InputError if the error exceeds the tolerance."""
@@ -47,10 +57,17 @@ class StepError:
         )
 
     def __str__(self) -> str:
+        steps = f"of {self.dt:g} s"
+        if self.longest:
+            steps = f"of {self.longest:.3g} s at most, which end at levels of the file"
         if self.legs == 0:
-            return f"of {self.dt:g} s, {UNTRIED}"
+            return f"{steps}, {UNTRIED}"
         legs = "1 leg" if self.legs == 1 else f"{self.legs} legs"
-        return f"of {self.dt:g} s, off by {self.off:.2g} m at most of {legs} that were flown again in finer steps"
+        told = f"{steps}, off by {self.off:.2g} m at most of {legs} that were flown again in finer steps"
+        if not self.longest:
+            return told
+        passed = f"each side of a cell or time of the file that a leg passes {self.kink:.2g} m"
+        return f"{told}; the file's bends from level to level allow {self.bound:.2g} m, and {passed}"
 
 
 def sampled_nodes(count: int, few: int = SAMPLED_NODES) -> Index:
@@ -76,14 +93,21 @@ def step_error(problem: Problem, start: Array, values: Array) -> StepError:
     """Return the step error of some legs from `start` (n, 3) [m]; `values` (n, 6) in the order of EDGE_FIELDS."""
     evaluator = problem.evaluator
     integration = evaluator.integration
-    finer = replace(evaluator, integration=replace(integration, dt=FINER * integration.dt))
+    finer = replace(evaluator, integration=replace(integration, dt=FINER * integration.dt)).on_even_steps()
     some = sampled_legs(len(values))
-    off = 0.0
+    off, slowest = 0.0, np.inf
     for n in some:
         leg = Edge(CONNECTED, *(float(value) for value in values[n]))
+        slowest = min(slowest, abs(leg.speed * np.sin(leg.glide_angle)))
         ends = [each.trace(start[n], leg, problem.departure)[-1, 1:] for each in (evaluator, finer)]
         off = max(off, float(np.linalg.norm(ends[0] - ends[1])))
-    return StepError(off, len(some), integration.dt, integration.tolerance)
+    error = StepError(off, len(some), integration.dt, integration.tolerance)
+    ladder = ladder_in(evaluator.flow)
+    if not (ladder.longest and isinstance(evaluator.flow, OceanGrid)):
+        return error
+    longest = min(STRETCH * integration.dt, ladder.longest)
+    kink = kink_shift(evaluator.flow, longest)
+    return replace(error, longest=longest, bound=ladder.shift / slowest, kink=kink)
 
 
 class StepSample:

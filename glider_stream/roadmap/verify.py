@@ -18,7 +18,7 @@ from ..kernels.cache import entry_point
 from ..kernels.control import control_of, glide_speed
 from ..kernels.edges import CONNECTED, GLIDE_ANGLE, HEADING, SPEED, TIME
 from ..kernels.flow import currents, rises, velocities
-from ..kernels.motion import step_on
+from ..kernels.motion import trace
 from ..kernels.place import Place
 from .evaluator import Evaluator
 from .problem import Problem
@@ -152,19 +152,12 @@ def _fly(medium, position, departure, source, target, edges, off, first, last): 
     for e in range(first, last):
         time, angle, speed = edges[e, TIME], edges[e, GLIDE_ANGLE], edges[e, SPEED]
         off[e] = np.inf
-        if not time <= latest:
+        if not 0.0 <= time <= latest:
             continue  # a damaged file may hold any value
         c = control_of(speed, angle, edges[e, HEADING])
         x, y, z = position[source[e]]
-        height = z
-        full = int(time / dt)
-        for n in range(full + 1):
-            if not rises(medium.flow):
-                height = z + n * dt * c.w
-            here = Place(x, y, height, departure + n * dt)
-            x, y, height = step_on(medium.flow, here, c, min(dt, time - n * dt))
-        if not rises(medium.flow):
-            height = z + time * c.w
+        path = trace(medium.flow, Place(x, y, z, departure), c, time, dt)
+        _, x, y, height = path[path.shape[0] - 1]
         goal = position[target[e]]
         off[e, 0] = np.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (height - goal[2]) ** 2)
         off[e, 1] = speed - glide_speed(medium.polar, 1 if angle > 0.0 else 0, abs(angle))

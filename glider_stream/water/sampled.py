@@ -71,7 +71,7 @@ def level_part(flow: kernel.Flow) -> kernel.Flow | None:
     kept = flow._asdict() | {"values": np.ascontiguousarray(flow.values[..., :2])}
     del kept["max_rise"]
     if isinstance(flow, kernel.RisingOceanGrid):
-        return kernel.OceanGrid(**kept)
+        return kernel.OceanGrid(**kept, ladder=kernel.NO_LADDER)
     speed = np.hypot(flow.values[..., 0], flow.values[..., 1]).max(axis=(1, 2))
     return kernel.Grid(**kept, level_speed=speed, level_carry=_carry(speed, 1 / flow.per_z))
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from glider_stream import plot
-from glider_stream.kernels.flow import Extent, OceanGrid, Vortices
+from glider_stream.kernels.flow import NO_LADDER, Extent, OceanGrid, Vortices
 from glider_stream.kernels.terrain import OpenWater, Seabed
 from glider_stream.search.path import Leg, Path
 
@@ -66,7 +66,9 @@ def ocean_scene():
     levels, times = np.array([-500.0, 0.0]), np.array([0.0, days])
     box = (lo, hi, lo, hi, 0.0, days)
     extent = Extent(*box, 0.4, 2e3)
-    flow = OceanGrid(values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, extent)
+    flow = OceanGrid(
+        values, levels, slot, 1 / 500.0, times, slot, 1 / days, index_map, per, per, NO_LADDER, extent
+    )
     terrain = Seabed(bottom, 20.0, index_map, per, per, lo, lo, bottom)
     position = np.random.default_rng(1).uniform([lo, lo, -500], [hi, hi, 0], (1500, 3))
     position = position[plot.sample_water(terrain, *position.T)]

@@ -15,6 +15,7 @@ from ...kernels.terrain import Seabed, allowed
 from ..frame import MAX_SCALE_ERROR, LocalFrame
 from .file import OceanFile, Times, parse_time
 from .grid import EVEN, Grid, IndexMap, gaps, index_map, span, unbroken
+from .ladder import ladder_of
 from .levels import no_such_levels
 
 READ_BEYOND = 2
@@ -126,6 +127,7 @@ def _assemble(
         index_map=at.index_map,
         per_x=at.per_x,
         per_y=at.per_y,
+        ladder=ladder_of(values, levels, None if np.isinf(span[0]) else times, spacing),
         extent=Extent(
             *(at.x_lo, at.x_hi, at.y_lo, at.y_hi),
             *span,

@@ -111,7 +111,9 @@ def with_rise(flow: OceanGrid, values: Array, levels: Array) -> RisingOceanGrid:
     level_slot, slots_per_z = slots(levels)
     new = {"values": np.ascontiguousarray(values), "levels": levels, "level_slot": level_slot}
     rise = float(np.abs(values[..., 2]).max()) * (1 + 1e-12)
-    return RisingOceanGrid(**flow._asdict() | new | {"slots_per_z": slots_per_z, "max_rise": rise})
+    kept = flow._asdict()
+    del kept["ladder"]
+    return RisingOceanGrid(**kept | new | {"slots_per_z": slots_per_z, "max_rise": rise})
 
 
 def _places(frame: LocalFrame, grid: Grid) -> Array:
