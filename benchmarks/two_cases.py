@@ -11,6 +11,7 @@ from pathlib import Path
 from PIL import Image
 
 from glider_stream import planner
+from glider_stream.opened import OpenedRoadmap
 
 CASES = (16, 54)
 
@@ -27,5 +28,5 @@ if __name__ == "__main__":
         path = planner.query(roadmap)
         print(f"{candidates} controls: {roadmap}\n{path}")
         file = options.output / f"seed-box-{candidates}.png"
-        planner.plot(roadmap, path, file)
+        OpenedRoadmap(roadmap, f"Seed box, {candidates} controls").plot(path, file)
         Image.open(file).convert("RGB").quantize(128).save(file, optimize=True)

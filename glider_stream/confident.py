@@ -1,18 +1,20 @@
 """Answers with confidence: reads mission, members and routes, and writes the route, and a figure."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path as File
 
 import numpy as np
 
 from .base.settings import require
 from .mission.confidence.answer import Confidence, confidence_of
-from .mission.confidence.ensemble import Ensemble, drawn, first_member, from_files
+from .mission.confidence.candidates import FORECAST
+from .mission.confidence.ensemble import Ensemble, Progress, drawn, first_member, from_files
 from .mission.confidence.judged import Criterion
 from .mission.settings import Mission, read_mission
 from .pilot.export import check_export, check_places, export_path
 from .search.flown_on import check_plan
-from .search.path import Path, check_frame, load_path
+from .search.path import Path, check_frame, load_plan
 
 Best = float | str
 """A share, 0.9 for the time by which 90 % arrive; "mean"; or "by" for most arrivals by a time."""
@@ -33,6 +35,7 @@ def answered(
     outputs: Sequence[str | File],
     figure: str | File | None,
     overrides: Sequence[str],
+    progress: Callable[[Progress], None],
 ) -> tuple[Confidence, list[str]]:
     """Return the answer, and notes on the files that are written; see `planner.confidence`."""
     require(
@@ -50,7 +53,8 @@ def answered(
     criterion = _criterion(best, by, resolved.arrival.longest)
     check_places(outputs, resolved.scenario.domain.frame() is not None)
     ensemble = drawn(resolved, draws, first) if draws is not None else from_files(resolved, members)
-    named = [(File(route).name, load_path(route)) for route in routes]
+    ensemble = replace(ensemble, progress=progress)
+    named = [(File(route).name, load_plan(route)) for route in routes]
     if named:
         ensemble = _between(ensemble, named)
     found = confidence_of(ensemble, criterion, named, replanned=replanned, reach=reach)
@@ -92,7 +96,7 @@ def _written(found: Confidence, outputs: Sequence[str | File]) -> list[str]:
     path = found.path
     if path is not None and outputs and found.best.candidate.member >= 0:
         name = found.best.candidate.name.partition(",")[0]
-        notes.append(f"the route is the fastest in {name}, and its file shows it as flown there")
+        notes.append(f"the route is the {name}, and its file shows it as flown there")
     if path is None and outputs:
         name = found.best.candidate.name
         return [f"the best, {name}, makes its orders on the way, so no route file is written"]
@@ -107,7 +111,10 @@ def _draw(found: Confidence, figure: str | File) -> None:
     from .plot.confidence import plot_confidence
 
     best, mission = found.best, found.ensemble.mission
-    shown = [best, *(each for each in found.flights if each.candidate.name in ("the forecast", "straight"))]
+    beside = [
+        next((e for e in found.flights if e.candidate.name.startswith(w)), None) for w in (FORECAST, "straight")
+    ]
+    shown = [best, *(each for each in beside if each is not None)]
     names = list({each.candidate.name: each.time for each in shown}.items())
     grey = [each.time for each in found.flights if each.candidate.name not in dict(names)]
     area = None if found.reach is None else (found.reach.place, found.reach.share, found.reach.by)

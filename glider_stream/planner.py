@@ -32,7 +32,7 @@ from .roadmap.slices import SlicedRoadmap
 from .roadmap.store import read_any_roadmap
 from .scenario import Scenario, read_scenario
 from .search.departures import Moment
-from .search.path import Path, load_path
+from .search.path import Path, load_plan
 from .search.surfacing import Surfacing
 from .search.trade_off import TradeOff
 from .water.domain import Point
@@ -40,6 +40,7 @@ from .water.domain import Point
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .evaluation import level_set
     from .evaluation import record as benchmarks
     from .evaluation.level_set import Bound
     from .evaluation.suite import Report
@@ -328,7 +329,7 @@ def replan(
     """
     refines = options.get("within") is not None or options.get("seconds") is not None
     split_outputs(options.get("outputs", ()), refines)  # before the roadmap is read
-    old = path if isinstance(path, Path) else load_path(path)
+    old = path if isinstance(path, Path) else load_plan(path)
     opened = open_plan(old, overrides) if source is None else open_either(source, overrides)
     return opened.replan(old, fix, time, **options)
 
@@ -470,7 +471,7 @@ def bound(
     nodes: int | None = None,
     dimensions: int | None = None,
     any_depth: bool = False,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: "Callable[[level_set.Progress], None]" = lambda progress: None,
 ) -> "Bound":
     """Find the least time that a route of a scenario can take, by a level set, with its error.
 
@@ -597,9 +598,9 @@ def describe(
         >>> description = planner.describe("currents.nc", at=[(18.5, 38.0, 100.0, None)])
         >>> print(description)  # doctest: +ELLIPSIS
         currents.nc
+          18.5, 38, 100 m: +0.07905 m/s east, -0.03942 m/s north; 0.088 m/s toward compass 117 deg
           u           uo (standard_name eastward_sea_water_velocity, m s-1)
         ...
-          18.5, 38, 100 m: +0.07905 m/s east, -0.03942 m/s north
     """
     from .water.describe import describe
 
@@ -908,6 +909,7 @@ def confidence(
     outputs: Sequence[str | File] = (),
     figure: str | File | None = None,
     overrides: Sequence[str] = (),
+    progress: "Callable[[Any], None]" = lambda progress: None,
 ) -> "tuple[Confidence, list[str]]":
     """Return how often and by when routes arrive in an ensemble of currents, and notes on the files written.
 
@@ -916,6 +918,7 @@ def confidence(
     number `first` on. Without `routes` (path files) candidates are searched. `best`: 0.9 for the earliest time by
     which 90 % arrive, "mean", or "by" for most arrivals `by` a time [s]. `replanned`: candidates are ways to plan
     anew at each call. `reach`: also where a vehicle can be by then. The chosen route is written to `outputs`.
+    `progress` is told of each member that is done.
 
     Examples:
         >>> answer, _ = planner.confidence("small-mission.toml", draws=2, best="mean")
@@ -924,5 +927,5 @@ def confidence(
     """
     from .confident import answered
 
-    given = (routes, members, draws, first, best, by, replanned, reach, outputs, figure, overrides)
+    given = (routes, members, draws, first, best, by, replanned, reach, outputs, figure, overrides, progress)
     return answered(mission, *given)

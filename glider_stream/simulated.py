@@ -8,12 +8,16 @@ import numpy as np
 
 from .base.output import check_output, replacing
 from .base.settings import require
-from .mission.campaign import Campaign
+from .mission.campaign import Campaign, waters_sha256
 from .mission.replay import path_of
 from .mission.run import Runner
 from .mission.settings import Mission
 from .search.path import placed
 
+CHANGED = (
+    "the mission's files hold other currents or another terrain than when its runs were flown; put the old files "
+    "back and give the same command again: the runs are kept, or fly anew with --restart"
+)
 Show = tuple[int, str]
 """The run and the policy that a page plays."""
 
@@ -40,10 +44,14 @@ def check_outputs(outputs: Sequence[str | Path], mission: Mission, runs: int, sh
 
 
 def write_campaign(campaign: Campaign, outputs: Sequence[str | Path], show: Show) -> None:
-    """Write a campaign to each output, in the form of its ending."""
+    """Write a campaign to each output, in the form of its ending.
+
+    InputError if the mission's files hold other currents or another terrain than when the runs were flown.
+    """
     if not outputs:
         return
     runner = Runner(campaign.mission)
+    require(not campaign.waters or waters_sha256(runner.worlds.read) == campaign.waters, CHANGED)
     for output in outputs:
         _WRITERS[Path(output).suffix.lower()](campaign, runner, Path(output), show)
 

@@ -214,7 +214,12 @@ SETS = {
     "half a list": ("sampling.shape=[5,5", "`sampling.shape` must be a list of 3", "got '[5,5'"),
     "NaN": ("integration.dt=nan", "`integration.dt` must be a finite number; got nan"),
     "a key that goes with another kind": ("neighbours.radius=5", "`neighbours.radius` is not known"),
-    "a kind that lacks its keys": ("sampling.kind=sobol", "`sampling.count` is missing"),
+    "a kind that lacks several keys": (
+        "flow.kind=upwelling",
+        "`flow.u`, `flow.v`, `flow.w` are missing",
+        "in the form --set flow.u=NUMBER --set flow.v=NUMBER --set flow.w=NUMBER",
+    ),
+    "a kind that lacks its keys": ("sampling.kind=sobol", "`sampling.count`, `sampling.seed` are missing"),
     "a whole section": ("sampling={kind='sobol'}", "section.key=value"),
     "more than any memory": (
         "sampling.shape=[9000000000,90000000,9]",
@@ -318,6 +323,7 @@ PATH = (
     '{"found": true, "cost": 1, "legs": [{"from": [0, 0, 0], "to": [0, 0, -1], "glide_angle_rad": -0.5, '
     '"heading_rad": 0, "speed_mps": 1, "depart_s": 0, "duration_s": %s, "miss_m": 0, "trajectory": %s}]}'
 )
+ORIGIN = ', "origin": {"departure_s": 0.0, "scenario": ""}}'
 PATHS = {
     "no JSON": "no JSON",
     "a list": "[]",
@@ -331,8 +337,11 @@ PATHS = {
     "rows of three": PATH % ("1", "[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]"),
     "back in time": PATH % ("1", "[[5, 0, 0, 0], [1, 0, 0, -1]]"),
     "no time at all": PATH % ("0", "[[0, 0, 0, 0], [0, 0, 0, -1]]"),
-    "another water": PATH.replace("[0, 0, 0]", "[0, 9999, 0]").replace("[0, 0, -1]", "[0, 9999, -0.479]")
-    % ("1", "[[0, 0, 9999, 0], [1, 0, 9999, -0.479]]"),
+    "another water": PATH.removesuffix("}")
+    .replace("[0, 0, 0]", "[0, 9999, 0]")
+    .replace("[0, 0, -1]", "[0, 9999, -0.479]")
+    % ("1", "[[0, 0, 9999, 0], [1, 0, 9999, -0.479]]")
+    + ORIGIN,
     "legs that were not found": PATH.replace("true", "false") % ("1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a time below 0": PATH % ("-1", "[[0, 0, 0, 0], [1, 0, 0, -1]]"),
     "a leg from nowhere": '{"found": true, "cost": 1, "legs": [{"from": [1, 2], "to": [1, 2, 3]}]}',

@@ -8,9 +8,11 @@ from types import SimpleNamespace
 
 import pytest
 from helpers.small import command, executable, roadmap, scenario_file, strict_json
+from numba import njit
 
-from glider_stream.base import progress
+from glider_stream.base import compiling, progress
 from glider_stream.cli import cli
+from glider_stream.cli.group import Command
 from glider_stream.roadmap.store import read_roadmap, write_roadmap
 
 LOG = "build: 1,540 of 1,540 pairs, "
@@ -29,11 +31,11 @@ def test_build_says_what_it_made(tmp_path, capsys):
     assert said.code == 0
     assert said.out.startswith("Roadmap: 77 nodes, 929 edges\n")
     assert "on 1 threads" in said.out
-    assert said.out.endswith(f"  file:   {output}\n")
     assert read_roadmap(output).target.tobytes() == roadmap().target.tobytes()
     # no terminal: a log
     assert said.err.startswith(LOG)
-    *log, note = said.err.splitlines()
+    *log, note, wrote = said.err.splitlines()
+    assert wrote == f"wrote {output}"
     assert log[-1].endswith(" left")
     assert note.startswith(
         "note: legs leave a node in 7 directions of 36, fewer than 9: a query finds a slower route than"
@@ -56,8 +58,12 @@ def test_set_reaches_the_scenario(tmp_path, capsys):
 def test_query_finds_a_path(file, tmp_path, capsys):
     path = tmp_path / "path.json"
     said = command(capsys, "query", file, "-o", path, "-o", tmp_path / "again.JSON")
-    assert (said.code, said.err) == (0, "")
+    assert (said.code, said.err) == (0, f"wrote {path}, {tmp_path / 'again.JSON'}\n")
     assert said.out.startswith("path from (-190, 190, 0) to (160, -160, 0): 4 legs, ")
+    assert said.out.endswith(f"; for a closer bound, `glider-stream bound {file}`\n")
+    other = command(capsys, "query", file, "--goal=100,-100,-75").out
+    assert "at most" in other
+    assert "closer bound" not in other  # that would be of the scenario's own ends
     assert said.out.count("\n") == 6
     assert strict_json(path.read_text())["found"] is True
     assert (tmp_path / "again.JSON").read_text() == path.read_text()
@@ -146,6 +152,20 @@ def test_a_log_gets_a_line_now_and_then_and_at_the_end(capsys, monkeypatch):
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.splitlines() == ["build: 1 of 10", "build: 3 of 10", "build: 10 of 10"]
+
+
+def test_a_command_says_once_that_it_compiles(capsys, monkeypatch):
+    def compile_two():
+        for add in (lambda a: a + 1, lambda a: a + 2):
+            njit(add)(1)
+
+    Command("small", callback=compile_two).main([], standalone_mode=False)
+    assert capsys.readouterr().err == ""  # there is a cache, and these are not kept in it: they are small
+    monkeypatch.setattr(compiling, "cache_folder", lambda: None)
+    Command("compile", callback=compile_two).main([], standalone_mode=False)
+    assert capsys.readouterr() == ("", f"{compiling.COMPILING}\n")
+    Command("nothing", callback=lambda: None).main([], standalone_mode=False)
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.slow

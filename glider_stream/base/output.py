@@ -6,6 +6,7 @@ import re
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 
 from .errors import InputError, Unwritable
@@ -16,6 +17,19 @@ MARKER = "glider-stream"
 
 LONGEST_NAME = 200
 """An output's name may have this many bytes; files beside it have longer names, and file systems allow 255."""
+
+_WRITTEN: ContextVar[list[Path] | None] = ContextVar("written", default=None)
+
+
+@contextlib.contextmanager
+def noting_files() -> Iterator[list[Path]]:
+    """Yield a list to which every output is added that is written in the block."""
+    files: list[Path] = []
+    before = _WRITTEN.set(files)
+    try:
+        yield files
+    finally:
+        _WRITTEN.reset(before)
 
 
 def check_output(path: str | Path) -> None:
@@ -69,6 +83,9 @@ def replacing(path: Path) -> Iterator[Path]:
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         os.replace(temporary, target)
+        noted = _WRITTEN.get()
+        if noted is not None:
+            noted.append(path)
     except OSError as error:
         reason = (error.strerror or "it cannot be written").lower()
         room = "make room on its disk, or name another output"

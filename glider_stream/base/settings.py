@@ -74,16 +74,38 @@ def _known(name: str, choices: typing.Iterable[str], what: str) -> None:
         raise InputError(f"{what} is not known; choose from: {', '.join(choices)}")
 
 
+def _example(kind: Any) -> str:
+    """Return what stands for a value of a type in an example."""
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        return _example(inner[0])
+    if origin is typing.Literal:
+        return f'"{inner[0]}"'
+    if origin is tuple:
+        return f"[{','.join(_example(part) for part in inner if part is not Ellipsis)}]"
+    return {float: "NUMBER", int: "WHOLE_NUMBER", str: "TEXT", bool: "true"}.get(kind, "TABLE")
+
+
+def _check_complete(lacks: Mapping[str, str], example: Mapping[str, str], where: str) -> None:
+    """Raise InputError that names all missing keys: one with its hint, several with a line as an example."""
+    names = ", ".join(f"`{where}.{key}`" for key in lacks)
+    require(len(lacks) != 1, f"{names} is missing: {', '.join(lacks.values())}")
+    line = " ".join(f"--set {where}.{key}={example[key]}" for key in lacks)
+    require(not lacks, f"{names} are missing; give all of them, in the form {line}")
+
+
 def from_table(kind: type[T], table: Mapping[str, Any], where: str) -> T:
     """Return an object of the dataclass `kind` from a table; InputError names the key that is wrong."""
     hints = typing.get_type_hints(kind)
     keys = {f.name: f for f in fields(typing.cast(Any, kind)) if f.init}
     for key in table:
         _known(key, keys, f"the key `{where}.{key}`")
-    for key, field in keys.items():
-        if key not in table and field.default is MISSING and field.default_factory is MISSING:
-            hint = field.metadata.get("missing", f"it must be {_described(hints[key])}")
-            raise InputError(f"`{where}.{key}` is missing: {hint}")
+    lacks = {
+        key: field.metadata.get("missing", f"it must be {_described(hints[key])}")
+        for key, field in keys.items()
+        if key not in table and field.default is MISSING and field.default_factory is MISSING
+    }
+    _check_complete(lacks, {key: _example(hints[key]) for key in lacks}, where)
     return kind(**{key: _fits(value, hints[key], f"{where}.{key}") for key, value in table.items()})
 
 

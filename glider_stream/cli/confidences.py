@@ -59,10 +59,12 @@ def confidence(
     candidates are searched; the best of them is chosen. Exit code 1 if none arrives as asked.
     """
     from .. import planner
+    from ..base.progress import reporter
 
     asked = _best(best)
     seconds = None if by is None else 3600.0 * by
-    answer, notes = planner.confidence(mission, routes, best=asked, by=seconds, **options)
+    with reporter("confidence") as progress:
+        answer, notes = planner.confidence(mission, routes, best=asked, by=seconds, progress=progress, **options)
     for note in notes:
         say(f"note: {note}", error=True)
     path = answer.path if as_card else None

@@ -117,4 +117,4 @@ def simulate(
     if as_json:
         show_json(campaign.as_dict())
     else:
-        say("\n".join([str(campaign), *(f"  file: {output}" for output in outputs)]))
+        say(campaign)

@@ -66,7 +66,7 @@ def build(
             road = planner.build_opened(scenario, output, progress=progress, **run)
             dense = road.density()
             done, empty = f"{road}\n  dense:  {dense}", road.why_no_edges() or dense.warning
-    say(f"{done}\n  file:   {output}")
+    say(done)
     if empty:
         say(f"note: {empty}", error=True)
 
@@ -82,7 +82,7 @@ def merge(parts: tuple[Path, ...], output: Path) -> None:
     from .. import planner
 
     road = planner.merge(parts, output)
-    say(f"{road}\n  file:   {output}")
+    say(road)
     if empty := planner.why_no_edges(road):
         say(f"note: {empty}", error=True)
 
@@ -166,4 +166,3 @@ def plot(
     else:
         path = paths[0] if paths else None
         planner.plot(roadmap, path, output, depths or None, chart=chart, fronts=fronts, overrides=overrides)
-    say(output)

@@ -231,13 +231,15 @@ def bound(
 ) -> None:
     """Find the least time that a route of SCENARIO can take, by a level set, with its error."""
     from .. import planner
+    from ..base.progress import reporter
 
-    found = planner.bound(
-        scenario,
-        overrides=overrides,
-        nodes=nodes,
-        dimensions=dimensions,
-        any_depth=any_depth,
-        progress=lambda line: say(f"bound: {line}", error=True),
-    )
+    with reporter("bound") as progress:
+        found = planner.bound(
+            scenario,
+            overrides=overrides,
+            nodes=nodes,
+            dimensions=dimensions,
+            any_depth=any_depth,
+            progress=progress,
+        )
     show(found, as_json)

@@ -6,8 +6,7 @@ from typing import Any
 
 import click
 
-from ..base.terminal import say
-from .answers import show, show_json
+from .answers import show
 from .group import cli
 from .options import FILE, JSON, NAME, key_and_value, place_and_time, scale_and_value
 
@@ -77,17 +76,11 @@ def map_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def _mapped(make: Callable[..., Any], *places: Any, output: Path, as_json: bool, **options: Any) -> None:
     """Make a map and print its figures."""
-    from .. import planner
-
     for pairs in ("columns", "scales"):
         options[pairs] = dict(options[pairs])
     options["columns"] = {what: str(column) for what, column in options["columns"].items()}
     found = make(*places, output, **options)
-    if as_json:
-        show_json(found.as_dict())
-        return
-    files = [output, planner.members_file(output)] if options["members"] else [output]
-    say("\n".join([str(found), *(f"  file: {file}" for file in files)]))
+    show(found, as_json)
 
 
 @cli.command()

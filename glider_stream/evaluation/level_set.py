@@ -23,6 +23,7 @@ difference between two grids estimates the scheme's.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,7 @@ class Bound:
 
     `dimensions`, 2 or 3; `spacing` [m] of the finer grid along each. `frozen`: the front moves in the current of
     the departure, though the flow changes. `sound`: the current is that of all depths, no mean of several.
+    `early` [s]: by how much the time may be below the optimum, since the front begins at a set around one end.
     """
 
     time: float
@@ -71,6 +73,7 @@ class Bound:
     spacing: tuple[float, ...]
     frozen: bool = False
     sound: bool = True
+    early: float = 0.0
 
     @property
     def least(self) -> float:
@@ -85,14 +88,17 @@ class Bound:
             "least_s": self.least,
             "dimensions": self.dimensions,
             "spacing_m": list(self.spacing),
+            "early_s": self.early if math.isfinite(self.early) else None,
             "kind": "bound" if self.sound else "estimate",
             **({"frozen": True} if self.frozen else {}),
         }
 
     def __str__(self) -> str:
         grid = " x ".join(f"{step:,.0f}" for step in self.spacing)
-        found = f"{span(self.time)} on a grid of {grid} m; two grids differ by {self.error:,.0f} s" + (
-            f"; {STILL}" if self.frozen else ""
+        early = f"by up to {self.early:,.0f} s" if math.isfinite(self.early) else "by an unknown time"
+        found = (
+            f"{span(self.time)} on a grid of {grid} m, {early} too early, since it begins at a set around one "
+            f"end; two grids differ by {self.error:,.0f} s" + (f"; {STILL}" if self.frozen else "")
         )
         if self.sound:
             return f"no route takes less than {span(self.least)}: a level set in all depths arrives after {found}"
@@ -100,6 +106,22 @@ class Bound:
             f"an estimate of the least time, {span(self.least)}, no bound: a level set in the mean current of a "
             f"yo's depths arrives after {found}. A route that stays in some of the depths may take less; "
             "--any-depth gives a bound"
+        )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the front is on grid `number` of two, of a `shape`: at `done` [s] of about `total` [s]."""
+
+    done: float
+    total: float
+    number: int
+    shape: tuple[int, ...]
+
+    def __str__(self) -> str:
+        grid = " x ".join(map(str, self.shape))
+        return (
+            f"grid {self.number} of 2, {grid} nodes: the front at {self.done:,.0f} s of about {self.total:,.0f} s"
         )
 
 
@@ -262,8 +284,21 @@ class Front:
         place[: carried.size] += sign * began * carried
         return began, place
 
-    def arrival(self) -> float:
-        """When the far end is reached [s], as the module says; inf where that is never."""
+    @property
+    def early(self) -> float:
+        """By how much [s] the arrival may be too early, since the front begins at a set and not at a point.
+
+        After tau / (1 + m / Vh) a glider from the start is still within the set; after tau / (1 - m / Vh) it can
+        be anywhere in it. inf if the current near the start differs by more than the glider's speed.
+        """
+        off = self.tau / self.began - 1.0
+        return self.tau / (1.0 - off) - self.began if off < 1 else math.inf
+
+    def arrival(self, progress: Callable[[float, float], None] = lambda now, left: None) -> float:
+        """When the far end is reached [s], as the module says; inf where that is never.
+
+        `progress` is told after each step where the front is and what is about left [s].
+        """
         waters, tau = self.waters, self.waters.still_water_time(self.nodes - self.source).reshape(self.shape)
         values, now = np.hypot(tau, self.tau) - self.tau, self.began
         latest = LATEST * float(waters.still_water_time((waters.ends[1] - waters.ends[0])[None])[0])
@@ -280,7 +315,9 @@ class Front:
             now, before, left = now + ahead, left, self._left(values)
             if left <= self.tau:
                 touched = now - ahead * (self.tau - left) / max(before - left, 1e-12)
+                progress(touched, 0.0)
                 return float(touched)
+            progress(now, left)
         return math.inf
 
     def _current(self, since: float) -> list[Array]:
@@ -352,6 +389,12 @@ def _weno(a: Array, b: Array, c: Array, d: Array, e: Array) -> Array:
     return np.asarray(sum(w * part for w, part in zip(weight, parts, strict=True)) / sum(weight))
 
 
+def _tell(
+    progress: Callable[[Progress], None], number: int, shape: tuple[int, ...], now: float, left: float
+) -> None:
+    progress(Progress(now, now + left, number, shape))
+
+
 def dimensions_of(problem: Problem) -> int:
     """2 where a route at the fastest glide would have many legs, else 3."""
     if problem.start is None or problem.goal is None:
@@ -365,12 +408,13 @@ def bound(
     problem: Problem,
     dimensions: int | None = None,
     nodes: int | None = None,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Callable[[Progress], None] = lambda progress: None,
     any_depth: bool = False,
 ) -> Bound:
     """The least time from start to goal, by two grids, the finer with `nodes` along its longest side.
 
-    With `any_depth`, in two dimensions, the front takes the current of whichever depth is best.
+    With `any_depth`, in two dimensions, the front takes the current of whichever depth is best. `progress` is
+    told of every step.
 
     InputError where the front does not reach the goal: land, the sides or the current are in the way.
     """
@@ -386,13 +430,13 @@ def bound(
     waters = Waters(problem, size, any_depth)
     tau = CELLS * float((waters.hi - waters.lo).max()) / (finest - 1) / waters.fastest
     found = []
-    for count in (1 + (finest - 1) // 2, finest):
+    for number, count in enumerate((1 + (finest - 1) // 2, finest), 1):
         front = Front(waters, count, tau)
-        found.append(front.arrival())
-        progress(f"a grid of {' x '.join(map(str, front.shape))}: {found[-1]:,.0f} s")
+        told = partial(_tell, progress, number, front.shape)
+        found.append(front.arrival(told))
     cure = "take a wider domain, or more nodes"
     require(math.isfinite(found[-1]), f"no front reaches the goal in {LATEST:g} times the straight way; {cure}")
     error = abs(found[1] - found[0]) if math.isfinite(found[0]) else found[1]
     still = problem.frozen and not is_steady(waters.flow)
     sound = size == 3 or any_depth or not waters.varies(front.nodes, 0.0)
-    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still, sound)
+    return Bound(found[1], error, size, tuple(float(step) for step in front.step), still, sound, front.early)

@@ -32,6 +32,10 @@ FORMAT = "glider-stream/campaign"
 CHECKPOINT = 30.0
 """After this many seconds the disk is asked again to keep the runs that are done."""
 MOST_RUNS = 1_000_000
+CHANGED = (
+    "a worker reads other currents or another terrain from the mission's files than the campaign began with; "
+    "give all machines the same files, leave them as they are, and start again with --restart"
+)
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,14 @@ class Progress:
 class Campaign:
     """The runs of a mission, sorted by number, each with one outcome for each policy.
 
-    `forecast` describes how the first run's forecast differs from the true current.
+    `forecast` describes how the first run's forecast differs from the true current. `waters` is the digest of
+    what was read from files.
     """
 
     mission: Mission
     runs: tuple[tuple[Outcome, ...], ...]
     forecast: str
+    waters: str = ""
 
     @property
     def rows(self) -> list[Row]:
@@ -162,7 +168,7 @@ def simulate(
     forecast = str(first)
     if keep is None:
         found = list(_found(runner, list(range(runs)), processes, address, progress, runs))
-        return _campaign(mission, found, forecast)
+        return _campaign(runner, found, forecast)
     check_output(keep)
     target = keep.resolve()
     identity = identity_of(mission, (first.true, first.forecast))
@@ -183,7 +189,7 @@ def simulate(
             reason = (error.strerror or "it cannot be written").lower()
             cure = f"make room on its disk; {kept}: give the same command again to continue"
             raise InputError(f"the journal {path} cannot be written: {reason}; {cure}") from None
-    return _campaign(mission, found, forecast)
+    return _campaign(runner, found, forecast)
 
 
 def identity_of(mission: Mission, waters: Sequence[Problem]) -> dict[str, str]:
@@ -191,13 +197,18 @@ def identity_of(mission: Mission, waters: Sequence[Problem]) -> dict[str, str]:
 
     The mission's text names the files of currents and of closed areas, but not what they hold.
     """
-    read = [part for water in waters for part in (water.evaluator.flow, water.evaluator.terrain)]
     return {
         "mission": mission.text,
-        "waters": " ".join(flow_sha256(part) for part in read),
+        "waters": waters_sha256(waters),
         "software": version("glider-stream"),
         "kernels": KERNEL_DIGEST,
     }
+
+
+def waters_sha256(waters: Sequence[Problem]) -> str:
+    """Return the SHA-256 of the currents and the terrain of some problems, one after another."""
+    read = [part for water in waters for part in (water.evaluator.flow, water.evaluator.terrain)]
+    return " ".join(flow_sha256(part) for part in read)
 
 
 def forget(keep: Path) -> None:
@@ -206,9 +217,10 @@ def forget(keep: Path) -> None:
     target.with_name(f"{target.name}.journal").unlink(missing_ok=True)
 
 
-def _campaign(mission: Mission, runs: list[Run], forecast: str) -> Campaign:
+def _campaign(runner: Runner, runs: list[Run], forecast: str) -> Campaign:
     ordered = sorted(runs, key=lambda run: run[0].number)
-    return Campaign(mission, tuple(tuple(run) for run in ordered), forecast)
+    waters = waters_sha256(runner.worlds.read)
+    return Campaign(runner.mission, tuple(tuple(run) for run in ordered), forecast, waters)
 
 
 def _found(
@@ -222,36 +234,54 @@ def _found(
     """Yield runs in the order in which they are done."""
     began, before = time.monotonic(), total - len(waiting)
     if address is not None:
-        runs = _on_cluster(runner.mission, waiting, address)
+        runs = _on_cluster(_work_of(runner), waiting, address)
     elif processes == 1 or len(waiting) < 2:
         runs = map(runner.run, waiting)
     else:
-        runs = _in_processes(runner.mission, waiting, processes)
+        runs = _in_processes(_work_of(runner), waiting, processes)
     for done, run in enumerate(runs, before + 1):
         yield run
         progress(Progress(done, total, time.monotonic() - began, before))
 
 
-_RUNNERS: dict[str, Runner] = {}
-"""The runner of this process, by its mission's text: a worker reads the water once."""
+@dataclass(frozen=True)
+class Work:
+    """What a worker needs to fly runs: the mission, the digest of the waters that it must read, the sender."""
+
+    mission: Mission
+    waters: str
+    software: dict[str, str]
+
+
+def _work_of(runner: Runner) -> Work:
+    return Work(runner.mission, waters_sha256(runner.worlds.read), software())
+
+
+_RUNNERS: dict[tuple[str, str], Runner] = {}
+"""The runner of this process, by its mission's text and its waters: a worker reads the water once."""
 _ONE_AT_A_TIME = Lock()
 """Kernels use all threads of a worker's process, so several Dask threads of a worker take turns."""
 
 
-def run_here(mission: Mission, number: int) -> Run:
-    """Return a run of a mission; this is called in a worker."""
+def run_here(work: Work, number: int) -> Run:
+    """Return a run of a mission; this is called in a worker.
+
+    InputError if its files hold other currents or other terrain here than where the campaign began.
+    """
     with _ONE_AT_A_TIME, threads(1):
-        if mission.text not in _RUNNERS:
+        key = work.mission.text, work.waters
+        if key not in _RUNNERS:
+            runner = Runner(work.mission)
+            require(waters_sha256(runner.worlds.read) == work.waters, CHANGED)
             _RUNNERS.clear()
-            _RUNNERS[mission.text] = Runner(mission)
-        return _RUNNERS[mission.text].run(number)
+            _RUNNERS[key] = runner
+        return _RUNNERS[key].run(number)
 
 
-def run_there(work: tuple[Mission, dict[str, str]], number: int) -> Run:
+def run_there(work: Work, number: int) -> Run:
     """Return a run of a mission, in a worker of a cluster whose software must be the sender's."""
-    mission, asked = work
-    check_software(asked)
-    return run_here(mission, number)
+    check_software(work.software)
+    return run_here(work, number)
 
 
 def _begin_worker() -> None:
@@ -268,11 +298,11 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _in_processes(mission: Mission, waiting: list[int], processes: int) -> Iterator[Run]:
+def _in_processes(work: Work, waiting: list[int], processes: int) -> Iterator[Run]:
     # a forked process would inherit the locks of threads that it does not have
     pool = ProcessPoolExecutor(min(processes, len(waiting)), get_context("spawn"), _begin_worker)
     try:
-        for future in as_completed([pool.submit(run_here, mission, number) for number in waiting]):
+        for future in as_completed([pool.submit(run_here, work, number) for number in waiting]):
             yield future.result()
     except BrokenProcessPool:
         cure = "give the same command again to continue, with fewer processes if memory was short"
@@ -281,6 +311,6 @@ def _in_processes(mission: Mission, waiting: list[int], processes: int) -> Itera
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _on_cluster(mission: Mission, waiting: list[int], address: str) -> Iterator[Run]:
+def _on_cluster(work: Work, waiting: list[int], address: str) -> Iterator[Run]:
     with scheduler(address) as cluster:
-        yield from cluster.each(run_there, (mission, software()), waiting)
+        yield from cluster.each(run_there, work, waiting)

@@ -97,6 +97,11 @@ class Worlds:
         evaluator = replace(self.true.evaluator, flow=flow)
         return self._made(replace(self.true, evaluator=evaluator), _rms(self._read(flow) - exact))
 
+    @property
+    def read(self) -> tuple[Problem, ...]:
+        """What is read from files: the true current, and the forecast if it has files of its own."""
+        return (self.true,) if self._fixed is None else (self.true, self._fixed.forecast)
+
     def _read(self, flow: kernel.Flow) -> Array:
         return np.asarray(velocities(flow, *self._sample))
 

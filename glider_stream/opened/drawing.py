@@ -9,7 +9,7 @@ import numpy as np
 from ..base.settings import require
 from ..plot.draw import check_drawing, draw_roadmap, draw_route, draw_routes
 from ..roadmap.slices import SlicedRoadmap
-from ..search.path import Path, load_path
+from ..search.path import Path, load_plan
 from ..search.surfacing import Surfacing
 from .searches import Searches
 
@@ -28,7 +28,7 @@ def draw(
 ) -> "Figure | None":
     """Draw a path, or the roadmap; see `OpenedScenario.plot`."""
     check_drawing(output, path, depths, chart, fronts)
-    route = path if path is None or isinstance(path, Path) else load_path(path)
+    route = path if path is None or isinstance(path, Path) else load_plan(path)
     free = searches.planner(Surfacing())  # this also compares the water with the roadmap's
     if route is None:
         cure = "draw a route over it, or build its roadmap"
@@ -56,7 +56,7 @@ def draw_beside(
 ) -> "Figure":
     """Draw two to four paths side by side; see `OpenedScenario.plot_routes`."""
     check_drawing(output, None, None, False, None)
-    routes = dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_path(path) for path in paths}
+    routes = dict(paths) if isinstance(paths, Mapping) else {File(path).stem: load_plan(path) for path in paths}
     named = f"each path needs a different name; got {', '.join(map(str, paths))}; rename a file"
     require(len(routes) == len(paths), named)
     searches.planner(Surfacing())  # this also compares the water with the roadmap's

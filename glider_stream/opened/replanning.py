@@ -6,10 +6,10 @@ from pathlib import Path as File
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Bools
 from ..base.clock import moment
+from ..base.nearest import tree_of
 from ..base.settings import require
 from ..pilot.replan import Replan, compared, good_until_of, shown
 from ..pilot.slocum import RADIUS
@@ -20,7 +20,7 @@ from ..scenario import with_currents
 from ..search.assembly import RoutePlanner
 from ..search.departures import Moment, seconds
 from ..search.flown_on import check_currents, check_plan, check_smooth, flown_on
-from ..search.path import SURFACE, Path, load_path, placed
+from ..search.path import SURFACE, Path, load_plan, placed
 from ..search.query import Planner
 from ..search.surfacing import Surfacing
 from ..search.time_dependent import ClockPlanner
@@ -66,7 +66,7 @@ def replanned(
     **options: Any,
 ) -> Replan:
     """Return a new plan from a position fix to the goal of an old plan; see `OpenedScenario.replan`."""
-    old = path if isinstance(path, Path) else load_path(path)
+    old = path if isinstance(path, Path) else load_plan(path)
     require(len(old.legs) > 0, "the plan holds no leg, so nothing is left to be planned anew; plan a route first")
     require(0 <= tolerance < np.inf, f"the tolerance must be from 0 % up; got {tolerance:.0%}")
     # a newer forecast is often written over the older one, whose currents are then no more known
@@ -117,18 +117,26 @@ def _found(
         nodes = np.ascontiguousarray(searches.position[near])
         among = ClockPlanner(planner.problem, nodes, planner.rule, planner.assembly.frozen)
         new = routed(searches, among, ends, **finding)
-        if new.found and (share == NEAR[-1] or _stays_within(new, searches.position, longer, share / 2)):
-            which = f"{near.mean():.0%} of the nodes, those on ways of the roadmap's legs at most {share:.0%}"
-            cure = "--all-nodes searches all, which takes longer"
-            return new, among, (f"searched among {which} longer than their best; {cure}",)
+        inside = new.found and _stays_within(new, searches.position, longer, share / 2)
+        if inside or (new.found and share == NEAR[-1]):
+            return new, among, (_told(int(near.sum()), near.size, share, inside),)
     return routed(searches, planner, ends, **finding), planner, ()
+
+
+def _told(searched: int, nodes: int, share: float, inside: bool) -> str:
+    """Return a note on which nodes were searched, and whether that may matter."""
+    far = f"ways at most {share:.0%} longer than the best, by the roadmap's legs"
+    edge = "the route comes near their edge, so a better one may lie beyond"
+    keeps = "the route keeps well inside these" if inside else edge
+    some = f"to be quick, only the {searched:,} nodes on {far}, were searched"
+    return f"{some}; {keeps}; --all-nodes takes all {nodes:,}"
 
 
 def _stays_within(path: Path, position: Array, longer: Array, share: float) -> bool:
     """Return whether the nodes (n, 3) [m] at a path's stops lie on ways at most a share `longer` (n,) than the
     best."""
     stops = np.array([leg.end for leg in path.legs[:-1]]).reshape(-1, 3)
-    return bool((longer[KDTree(position).query(stops)[1]] <= share).all())
+    return bool((longer[tree_of(position).query(stops)[1]] <= share).all())
 
 
 def _longer(searches: Searches, start: Array, goal: Array) -> Array:

@@ -1,9 +1,12 @@
 """One route of a scenario or a roadmap, made better and written."""
 
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path as File
 from typing import Any
+
+import numpy as np
 
 from ..base.output import check_output
 from ..base.settings import require
@@ -65,9 +68,24 @@ def routed(
         thinned=thin,
     )
     if path.found and path.legs:
-        path = replace(path, least=searches.least(path, planner.problem.departure))
+        least = searches.least(path, planner.problem.departure)
+        path = replace(path, least=least, closer=closer_bound(searches, planner, path))
     path = replace(path, origin=searches.origin(planner))
     return exported(path, outputs, **written)
+
+
+def closer_bound(searches: Searches, planner: RoutePlanner, path: Path) -> str:
+    """Return the command that bounds a path's time.
+
+    It is empty where the path's cost, ends or departure are not those of the scenario.
+    """
+    problem, file = searches.problem, searches.file
+    if problem.start is None or problem.goal is None or path.unit != "s":
+        return ""
+    own = np.array_equal(path.start, problem.start) and np.array_equal(path.goal, problem.goal)
+    if not own or planner.problem.departure != problem.departure:
+        return ""
+    return f"glider-stream bound {'SCENARIO' if file is None else shlex.quote(str(file))}"
 
 
 def exported(path: Path, outputs: Sequence[str | File], **written: Any) -> Path:

@@ -91,7 +91,11 @@ class Card:
                 f"it cannot hold station on legs {', '.join(outrun)}"
             )
         sure = self.path.confidence
-        lines += [] if sure is None else [f"{sure['ensemble']}, {sure['flown']}:", *told(sure)]
+        if sure is not None:
+            lines.append(
+                f"arrivals above: as planned, in {sure['planned_in']}; below: in the members, with errors"
+            )
+            lines += [f"{sure['ensemble']}, {sure['flown']}:", *told(sure)]
         return "\n".join([*lines, *([FROZEN] if self.path.frozen else [])])
 
     def _line(self, name: str, row: Row) -> str:

@@ -12,6 +12,7 @@ from xml.etree import ElementTree as Xml
 from ..base.errors import InputError
 from ..base.settings import require
 from ..base.untrusted import check_file
+from ..search.path import NO_ORIGIN
 from .route_columns import HEIGHTS, NotARoute, column_of, csv_points, depth_of, refuse_unknown, stated_height
 from .route_maps import OURS, Mark, gpx_points, kml_points, route_of
 from .seaglider import target_points
@@ -108,7 +109,8 @@ def _json(text: str) -> Found:
         if not table["legs"]:
             raise NotARoute("it holds no leg; give a file in which a path was found")
         scenario = str(table.get("origin", {}).get("scenario", ""))
-        return Found([table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False, [], scenario)
+        notes = [] if scenario else [f"the route {NO_ORIGIN}"]
+        return Found([table["legs"][0]["from"], *(leg["to"] for leg in table["legs"])], False, notes, scenario)
     features = table["features"] if table["type"] == "FeatureCollection" else [table]
     lines: list[tuple[list[Any], dict[str, Any]]] = []
     points: list[tuple[list[Any], dict[str, Any]]] = []

@@ -1,6 +1,7 @@
 """Fronts: lines of equal arrival time between a roadmap's nodes, one for each number of hours."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,11 +15,14 @@ from .water import Frame, sample_water
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 MOST = 100
 """At most this many lines are drawn; more would be a grey area."""
 STRETCHED = 3.0
 """A triangle with a side of this many times the median side is left out: it covers water without nodes."""
+EDGE, APART = 0.035, 0.08
+"""Labels lie so far from the map's edge and from each other, as shares of its sides."""
 HOUR = 3600.0
 FRONT = "#7a1f6b"
 
@@ -79,12 +83,26 @@ def draw_fronts(ax: "Axes", frame: Frame, fronts: Fronts, hours: float) -> None:
     levels = front_times(fronts, hours)
     if not levels.size or not fronts.triangles.size:
         return
-    from matplotlib.patheffects import withStroke
     from matplotlib.tri import Triangulation
 
     mesh = Triangulation(fronts.x / frame.unit, fronts.y / frame.unit, fronts.triangles)
     lines: Any = ax.tricontour(
         mesh, fronts.time / HOUR, levels=levels / HOUR, colors=FRONT, linewidths=0.9, zorder=3
     )
-    for text in ax.clabel(lines, fmt=lambda level: f"{level:g} h", fontsize=7.5, inline=True):
-        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+    texts = ax.clabel(lines, fmt=lambda level: f"{level:g} h", fontsize=7.5, inline=False)
+    for text in texts:
+        text.set_bbox({"facecolor": "white", "alpha": 0.75, "pad": 0.6, "linewidth": 0.0})
+    _keep_apart(texts, frame)
+
+
+def _keep_apart(texts: "Sequence[Text]", frame: Frame) -> None:
+    """Remove labels that would lie over the map's edge or over another label."""
+    low, high = (np.array([frame.x[n], frame.y[n]]) / frame.unit for n in range(2))
+    kept: list[Array] = []
+    for text in texts:
+        place = (np.array(text.get_position()) - low) / (high - low)
+        inside = min(place.min(), (1.0 - place).min()) > EDGE
+        if inside and all(np.hypot(*(place - other)) > APART for other in kept):
+            kept.append(place)
+        else:
+            text.remove()

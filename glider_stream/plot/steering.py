@@ -107,9 +107,11 @@ def plot_steering(problem: "Problem", position: Array, start: Array, goal: Array
         return frozen(figure)
 
 
-def _draw_water(ax: Any, evaluator: Evaluator, problem: "Problem", frame: Frame, height: float) -> None:
-    draw_current(ax, evaluator.flow, evaluator.terrain, frame, -height, problem.departure, pale=0.65, arrows=20)
+def _draw_water(ax: Any, evaluator: Evaluator, problem: "Problem", frame: Frame, height: float) -> Any:
+    look: dict[str, Any] = {"pale": 0.65, "arrows": 20}
+    image = draw_current(ax, evaluator.flow, evaluator.terrain, frame, -height, problem.departure, **look)
     ax.set(xlabel=frame.labels[0], ylabel=frame.labels[1])
+    return image
 
 
 def _draw_paths(
@@ -146,7 +148,7 @@ def _draw_paths(
 def _draw_mesh(
     ax: Any, evaluator: Evaluator, problem: "Problem", frame: Frame, fan: Fan, goal: Array, position: Array
 ) -> None:
-    _draw_water(ax, evaluator, problem, frame, fan.height)
+    image = _draw_water(ax, evaluator, problem, frame, fan.height)
     for i in thinned(MESH[0], LINES[0]):
         ax.plot(fan.x[i] / frame.unit, fan.y[i] / frame.unit, color="#30307a", linewidth=0.9, zorder=4)
     for j in thinned(MESH[1], LINES[1]):
@@ -165,6 +167,13 @@ def _draw_mesh(
         f"(b) Its mesh at {-fan.height:.4g} m, blue: one glide angle, brown: one heading;\n"
         "nodes at that depth, filled where they are reached"
     )
+    where = f"Current speed at {-fan.height:.4g} m (m/s)"
+    ax.figure.colorbar(image, ax=ax, label=where, location="bottom", aspect=45, pad=0.01)
+
+
+def _compass(heading: Array) -> Array:
+    """Return headings from 0 to 2 pi [rad] as degrees clockwise from north, from 90 down to -270."""
+    return np.asarray(90.0 - np.degrees(heading))
 
 
 def _draw_controls(
@@ -173,26 +182,25 @@ def _draw_controls(
     from matplotlib.colors import LogNorm
 
     miss = np.hypot(fan.x - goal[0], fan.y - goal[1])
-    heading, angle = np.degrees(fan.heading), np.degrees(fan.angle)
+    compass, angle = _compass(fan.heading), np.degrees(fan.angle)
     shade = colours("cividis", 0.15, 1.0)
-    image = ax.pcolormesh(heading, angle, np.maximum(miss, 1.0), cmap=shade, norm=LogNorm(), shading="gouraud")
+    image = ax.pcolormesh(compass, angle, np.maximum(miss, 1.0), cmap=shade, norm=LogNorm(), shading="gouraud")
     over = folded(fan)
     if over.any():
-        ax.contourf(heading, angle, over, levels=[0.5, 1.5], colors="none", hatches=["////"])
-        ax.contour(heading, angle, over, levels=[0.5], colors=INK, linewidths=0.8)
+        ax.contourf(compass, angle, over, levels=[0.5, 1.5], colors="none", hatches=["////"])
+        ax.contour(compass, angle, over, levels=[0.5], colors=INK, linewidths=0.8)
     line = evaluator.control_line(fan.start, goal, CANDIDATES, problem.departure)
     nearest = 0.0
     if len(line):
         ends = evaluator.landings(fan.start, fan.height, line[:, 0], line[:, 1], problem.departure)
         nearest = float(np.hypot(*(ends - goal[:2]).T).min())
-        ax.scatter(
-            np.degrees(line[:, 1]) % 360, np.degrees(line[:, 0]), s=26, c="white", edgecolors=INK, zorder=5
-        )
-    ax.scatter(
-        np.degrees(solved[:, 1]), np.degrees(solved[:, 0]), marker="*", s=230, c="#e0261c", ec="white", zorder=6
-    )
-    ax.set(xlabel="Heading, counter-clockwise from east (degrees)", ylabel="Glide angle (degrees)")
-    ax.set(xlim=(0, 360), ylim=(angle[0], angle[-1]))
+        at = _compass(line[:, 1] % (2.0 * math.pi)), np.degrees(line[:, 0])
+        ax.scatter(*at, s=26, c="white", edgecolors=INK, zorder=5)
+    legs = _compass(solved[:, 1]), np.degrees(solved[:, 0])
+    ax.scatter(*legs, marker="*", s=230, c="#e0261c", ec="white", zorder=6)
+    ax.set(xlabel="Heading, clockwise from north (degrees)", ylabel="Glide angle (degrees)")
+    ax.set(xlim=(-270, 90), ylim=(angle[0], angle[-1]))
+    ax.set_xticks(range(-270, 91, 45), [f"{tick % 360}" for tick in range(-270, 91, 45)])
     ax.set_title(
         f"(c) Every control's miss of the star; red: the legs, white: the control line\n"
         f"(nearest {nearest:.3g} m off), hatched: the map is folded over"

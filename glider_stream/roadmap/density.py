@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Index
+from ..base.nearest import tree_of
 from .roadmap import BaseRoadmap
 
 SECTORS = 36
@@ -40,7 +40,7 @@ class Density:
         found = []
         if self.legs > WIDEST:
             found.append(f"nodes lie {self.legs:.2g} legs apart, more than {WIDEST:g}")
-        if self.directions < FEWEST:
+        if round(self.directions) < FEWEST:  # as it is shown
             few = f"legs leave a node in {self.directions:.0f} directions of {SECTORS}"
             found.append(f"{few}, fewer than {FEWEST:.0f}")
         cure = (
@@ -83,7 +83,7 @@ def _spacing(position: Array, some: Index) -> float:
     layer = np.searchsorted(levels, position[:, 2]) * 10 * scale if layered else position[:, 2]
     at = np.column_stack([position[:, :2], layer])
     count = min(AROUND + 1, len(position))
-    far = np.asarray(KDTree(at).query(at[some], k=[count])[0])[:, 0]
+    far = np.asarray(tree_of(at).query(at[some], k=[count])[0])[:, 0]
     far = far[far < scale] if layered else far
     if not far.size:
         return scale

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Bools, Index
+from ..base.nearest import tree_of
 from ..base.threads import in_parallel
 from ..kernels import follow
 from ..kernels.connect import Pairs
@@ -62,7 +62,7 @@ def nodes_near(position: Array) -> Index:
 def _nearest(points: Array, numbers: Index, at: Array, itself: Index, count: int) -> Index:
     """Return the numbers (n, count) of the points nearest to each place; the place's own number is left out."""
     asked = min(count + 1, len(points))
-    _, found = KDTree(points).query(at, k=np.arange(1, asked + 1))
+    _, found = tree_of(points).query(at, k=np.arange(1, asked + 1))
     chosen = numbers[found]
     result = np.repeat(itself[:, None], count, axis=1)
     # the place's own number goes last and is cut off

@@ -3,13 +3,16 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Index
+from ..base.nearest import tree_of
 from ..base.settings import require
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 
 class Neighbourhood(Protocol):
@@ -43,12 +46,12 @@ class Nearest:
     def among(self, position: Array, volume: float) -> Neighbourhood:
         """Return the law for nodes (n, 3) [m] that fill a `volume` [m^3]."""
         k = math.ceil(math.e * (4 / 3) * math.log(max(len(position), 2))) if self.k == "prm*" else int(self.k)
-        return _Nearest(KDTree(position), k)
+        return _Nearest(tree_of(position), k)
 
 
 @dataclass(frozen=True)
 class _Nearest:
-    tree: KDTree
+    tree: "KDTree"
     k: int
 
     def of(self, point: Array) -> Index:
@@ -82,12 +85,12 @@ class Radius:
         n = max(len(position), 2)
         unit_ball = 4 / 3 * math.pi
         prm_star = 2 * (4 / 3 * volume / unit_ball * math.log(n) / n) ** (1 / 3)
-        return _Radius(KDTree(position), prm_star if self.radius == "prm*" else float(self.radius))
+        return _Radius(tree_of(position), prm_star if self.radius == "prm*" else float(self.radius))
 
 
 @dataclass(frozen=True)
 class _Radius:
-    tree: KDTree
+    tree: "KDTree"
     radius: float
 
     def of(self, point: Array) -> Index:

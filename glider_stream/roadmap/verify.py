@@ -98,7 +98,7 @@ class Verification:
             spread = ", ".join(f"{share} {1000 * off:.1f} mm" for share, off in self._quantiles().items())
             lines.append(f"  its misses differ by: {spread}")
             worst = ", ".join(f"{a} to {b} ({1000 * off:.1f} mm)" for a, b, off in self.worst)
-            lines.append(f"  worst: {worst}")
+            lines.append(f"  worst, from node to node: {worst}")
         return "\n".join(lines)
 
 

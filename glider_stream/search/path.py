@@ -3,7 +3,8 @@
 import json
 import math
 import tomllib
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path as File
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.clock import moment, span
-from ..base.errors import InputError
+from ..base.errors import InputError, InputWarning
 from ..base.settings import from_table, require
 from ..base.untrusted import check_file
 from ..kernels.edges import Edge, Status
@@ -33,6 +34,8 @@ SAME_CENTRE = 1e-7
 """Metres of two plans count from one place if their frames' centres differ by less than this [degrees]."""
 FROZEN = "FROZEN: every leg meets the current of the departure, so these times and places do not hold"
 """Every output says this about a path whose clock does not run."""
+FIRST, LAST = 10, 5
+"""Of a route of many legs, people see so many at its begin and its end; JSON has all."""
 Hop = tuple[Array, Array, Edge]
 """A leg in a search: its start and end (3,) [m], and the edge between them."""
 
@@ -181,7 +184,7 @@ class Path:
     in the members of an ensemble, if it was flown there.
     `unthinned` are the number of legs and the time [s] before thinning. `unpolished` are the number of legs, the
     time [s] and the cost before polishing. `rounds` are the rounds of refinement. `least` is a lower bound of the
-    cost of every route, from the greatest currents.
+    cost of every route, from the greatest currents. `closer` is the command that finds a closer one, if known.
 
     Examples:
         >>> path = road.query()
@@ -210,6 +213,7 @@ class Path:
     expanded: float | None = None
     origin: Origin | None = None
     confidence: Mapping[str, Any] | None = None
+    closer: str = ""
 
     @property
     def clock_runs(self) -> bool:
@@ -294,7 +298,8 @@ class Path:
         line = f"  no route costs less than {least}, by the greatest currents: this one at most {over:.1%} more"
         if self.likely_gain is not None:
             return [f"{line}; another round may gain {self.likely_gain:.2%}, an estimate"]
-        return [f"{line}; to look for a better one, --within 0.01; for a closer bound, `glider-stream bound`"]
+        closer = f"; for a closer bound, `{self.closer}`" if self.closer else ""
+        return [f"{line}; to look for a better one, --within 1%{closer}"]
 
     def __str__(self) -> str:
         if self.lonlat is None:
@@ -318,8 +323,16 @@ class Path:
         if self.frozen:
             title += f"; {FROZEN}"
         rounds = [item.told(n) for n, item in enumerate(self.rounds, 1)]
-        lines = [f"  {leg.told(self.departs)}" for leg in self.legs]
+        lines = shortened([f"  {leg.told(self.departs)}" for leg in self.legs])
         return "\n".join([title, *rounds, *lines, *self._told_against_the_best()])
+
+
+def shortened(lines: Sequence[str]) -> list[str]:
+    """Return the lines of a route's legs for people; of many, only the first and the last."""
+    left = len(lines) - FIRST - LAST
+    if left <= FIRST:
+        return list(lines)
+    return [*lines[:FIRST], f"  ... {left} more legs, in --json and in the file of -o", *lines[-LAST:]]
 
 
 def hops_of(path: Path) -> list[Hop]:
@@ -338,6 +351,12 @@ def hops_of(path: Path) -> list[Hop]:
 
 BESIDE = 0.01
 """Parts of a leg in a file may differ by this share of its length or time, or of 1 m or 1 s if it is shorter."""
+
+
+NO_ORIGIN = (
+    "has no `origin`, so it cannot be checked for its frame: its places are taken as metres from the origin of "
+    "the scenario here"
+)
 
 
 def load_path(file: str | File) -> Path:
@@ -371,6 +390,17 @@ def load_path(file: str | File) -> Path:
     origin = _read_origin(table["origin"], file) if "origin" in table else None
     known: dict[str, Any] = {"least": least, "departure": departure, "frozen": frozen, "origin": origin}
     return Path(legs[0].start, legs[-1].end, cost, legs, **known)
+
+
+def load_plan(file: str | File) -> Path:
+    """Read a path file, as `load_path` does, to put it into a scenario's water.
+
+    InputWarning if it does not say what it was planned with: then nothing tells from where its metres count.
+    """
+    path = load_path(file)
+    if path.origin is None:
+        warnings.warn(f"the path file {file} {NO_ORIGIN}", InputWarning, stacklevel=2)
+    return path
 
 
 def _read_origin(table: Any, file: str | File) -> Origin:

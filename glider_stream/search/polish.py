@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpbsv
 
 from ..base.arrays import Array
 from ..kernels.edges import Edge, Status
@@ -355,6 +354,8 @@ class _Step:
 
     def move(self, damping: float) -> Array:
         """Return the step (n + 1, 3) [m] of all stops; steps that are too long are shortened."""
+        from scipy.linalg.lapack import dpbsv  # importing it takes 0.03 s, which a query without it does not need
+
         band, free = self.band.copy(), self.free.ravel()
         gradient = np.where(free, self.gradient.ravel(), 0.0)
         for n in range(1, 6):

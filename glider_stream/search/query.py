@@ -9,8 +9,6 @@ from threading import Lock
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Index
 from ..kernels.cheapest import Ahead, Rows, cheapest_ways
@@ -137,6 +135,9 @@ class Planner(RoutePlanner):
 
     def remaining(self, goal: ArrayLike | None = None) -> Array:
         """Return the least time (n,) [s] from each node to a point; inf if no way leads there."""
+        from scipy.sparse import csr_array  # importing both takes 0.1 s, and a query does not need them
+        from scipy.sparse.csgraph import dijkstra
+
         road, end = self.roadmap, self._goal(goal)
         nodes = len(road.position)
         backward = csr_array((road.time, road.target, road.indptr), shape=(nodes, nodes)).T.tocoo()

@@ -20,11 +20,9 @@ from pathlib import Path as File
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import KDTree
 
 from ..base.arrays import Array, Bools, Index
+from ..base.nearest import tree_of
 from ..base.settings import require
 from ..base.threads import threads
 from ..kernels.edges import COST, STATUS, TIME, Edge, Status
@@ -240,6 +238,9 @@ class Refiner:
 
         Polishing finds the best route near its first route, so another first route may give a better result.
         """
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import dijkstra
+
         starts = [found] if found.cost < (1 + WORTH) * best.cost else []
         if not starts or self.polish is None or self.clock or len(found.legs) > FEW_LEGS:
             return starts
@@ -251,7 +252,7 @@ class Refiner:
         near = np.flatnonzero(cloud.sums() <= (1 + WIDEST) * cloud.sums().min())
         passed = found.trajectory[:, 1:]
         for _ in range(OTHERS):
-            far = KDTree(passed).query(cloud.position[near])[0]
+            far = tree_of(passed).query(cloud.position[near])[0]
             node = near[int(np.argmax(far))]
             nodes = _chain(int(node), back)[::-1] + _chain(int(node), ahead)[1:]
             starts.append(self.planner.fly(self._hops(cloud, edges, nodes)))
@@ -324,7 +325,7 @@ class Refiner:
         stops = self._stops(cloud, best)
         most = (1 + share) * (float(sums[stops].max()) if stops.size else best.cost)
         near = np.flatnonzero(sums <= most)
-        tree = KDTree(cloud.position[np.isfinite(sums)] / scale)
+        tree = tree_of(cloud.position[np.isfinite(sums)] / scale)
         box = self._box(cloud.position[near], scale)
         finer = FINER
         while True:
@@ -375,7 +376,7 @@ class Refiner:
     def _stops(self, cloud: _Cloud, best: Path) -> Index:
         """Return the nodes at which a route stops; with a rule of surfacing their sums may not be the least."""
         stops = np.array([best.legs[0].start, *(leg.end for leg in best.legs)])
-        far, near = (np.asarray(part) for part in KDTree(cloud.position).query(stops))
+        far, near = (np.asarray(part) for part in tree_of(cloud.position).query(stops))
         at = near[(far == 0.0) & np.isfinite(cloud.sums()[near])]
         return np.asarray(at, np.int64)
 
@@ -397,7 +398,7 @@ class Refiner:
         unsure = DOUBT / FINER * max(cells.spacing / level, cells.rise / sink if cells.between else 0.0)
         current = velocities(evaluator.flow, *np.ascontiguousarray(position.T), guess.when)
         reach = (level + float(np.hypot(*current.T).max())) * integration.dt * integration.steps
-        tree = KDTree(position[:, :2])
+        tree = tree_of(position[:, :2])
 
         def wanted(source: Index) -> Bools:
             rows = list(map(np.array, tree.query_ball_point(position[source, :2], reach, workers=-1)))
@@ -450,6 +451,9 @@ def _costs(
     count: int, source: Index, target: Index, costs: Array, times: Array, start: int, goal: int
 ) -> tuple[Array, Array, Array]:
     """Return of each node (count,): cost from the start, cost to the goal, time [s] from the start."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
     graph, clock = (csr_array((values, (source, target)), shape=(count, count)) for values in (costs, times))
     since, when = (dijkstra(weights, indices=[start])[0] for weights in (graph, clock))
     left = dijkstra(graph.T.tocsr(), indices=[goal])[0]

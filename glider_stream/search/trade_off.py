@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from ..base.arrays import Array, Bools, Index
 from ..base.clock import span
@@ -185,6 +183,9 @@ class LeftInRoadmap:
 
 def _backward(begin: Index, end: Index, weight: Array, goals: Index, count: int) -> Array:
     """Return the least sums (count,) from each place to one of the goals, over reversed legs."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
     graph = csr_array((weight, (begin, end)), shape=(count, count))
     found: Array = dijkstra(graph, directed=True, indices=goals, min_only=True)
     return found * (

@@ -112,7 +112,7 @@ class Description:
     def __str__(self) -> str:
         file, (dlon, dlat, east, north) = self.file, self.spacing
         nt, nz, ny, nx = file.u.shape
-        lines = [plain(file.name)]
+        lines = [plain(file.name), *(f"  {self._told(point)}" for point in self.points)]
         lines += [f"  {plain(key):<12}{plain(what)}" for key, what in file.took.items()]
         (west, east_end), (south, north_end) = file.grid.bounds
         lines.append(f"  extent      lon {west:.5g} to {east_end:.5g}, ")
@@ -128,41 +128,41 @@ class Description:
             speeds = "no water"
             if level.max_speed is not None:
                 speeds = f"at most {level.max_speed:.2f} m/s, rms {level.rms_speed:.2f} m/s"
-            lines.append(f"  at {f'{level.depth:.4g} m':<9}{speeds}{_ratio(level.divergence_ratio)}")
+            lines.append(f"  at {f'{level.depth:.4g} m':<9}{speeds}")
         lines.append(f"  divergence  {self._meaning()}")
-        lines.append(f"  frame       {self._frame()}")
-        lines += [f"  note        {plain(note)}" for note in file.notes]
-        for point in self.points:
-            where = f"{point.lon:g}, {point.lat:g}"
-            where += "" if point.depth is None else f", {point.depth:g} m"
-            where += "" if point.time is None else f", {point.time}"
-            if point.u_east is None or point.v_north is None:
-                held = south <= point.lat <= north_end and (point.lon - west) % 360 <= east_end - west
-                lines.append(f"  {where}: " + ("no water, or no data" if held else "outside the file's extent"))
-            else:
-                lines.append(f"  {where}: {point.u_east:+.5f} m/s east, {point.v_north:+.5f} m/s north")
-        return "\n".join(lines)
+        lines.append(f"  flat map    {self._frame()}")
+        return "\n".join([*lines, *(f"  note        {plain(note)}" for note in file.notes)])
+
+    def _told(self, point: Point) -> str:
+        """Return a place and the current there, for people."""
+        (west, east), (south, north) = self.file.grid.bounds
+        where = f"{point.lon:g}, {point.lat:g}"
+        where += "" if point.depth is None else f", {point.depth:g} m"
+        where += "" if point.time is None else f", {point.time}"
+        if point.u_east is None or point.v_north is None:
+            held = south <= point.lat <= north and (point.lon - west) % 360 <= east - west
+            return f"{where}: " + ("no water, or no data" if held else "outside the file's extent")
+        speed, toward = np.hypot(point.u_east, point.v_north), np.degrees(np.arctan2(point.u_east, point.v_north))
+        whole = f"{speed:.3f} m/s toward compass {toward % 360:.0f} deg"
+        return f"{where}: {point.u_east:+.5f} m/s east, {point.v_north:+.5f} m/s north; {whole}"
 
     def _meaning(self) -> str:
         ratio = self.divergence_ratio
         if ratio is None:
             return "unknown: no wet cell has wet neighbours that move"
         if ratio <= NEARLY_FREE:
-            return f"{ratio:.2f} of vorticity: small, the stream value hardly depends on the path"
+            return f"small, {ratio:.2f} of vorticity: legs by any steering method fit"
         return (
-            f"{ratio:.2f} of vorticity: large, the stream value depends on the path; "
-            "controls found with it miss more often; the flow map is not affected"
+            f"large, {ratio:.2f} of vorticity: the method streamline misses more often, because its stream value "
+            "depends on the path; flow-map is not affected"
         )
 
     def _frame(self) -> str:
         if self.frame_error > MAX_SCALE_ERROR:
-            return "the whole extent is too wide for one flat frame: plan in a smaller area"
-        text = f"one flat frame over the whole extent is off by up to {100 * self.frame_error:.3f} % in length"
+            return "the whole extent is too wide for one, on which plans are made: plan in a smaller area"
+        off = f"off by up to {100 * self.frame_error:.3f} % in length"
+        text = f"plans are made on one; over the whole extent it is {off}"
         return text if self.map_error is None else f"{text}, by {self.map_error:.2g} m in place"
-
-
-def _ratio(ratio: float | None) -> str:
-    return "" if ratio is None else f", divergence {ratio:.2f} of vorticity"
 
 
 def _finite(value: float) -> float | None:

@@ -8,7 +8,7 @@ import pytest
 from helpers.small import command, roadmap, scenario_file, strict_json
 
 from glider_stream.base.errors import InputError
-from glider_stream.evaluation.level_set import Bound, Front, Waters, bound, dimensions_of
+from glider_stream.evaluation.level_set import NEAR, Bound, Front, Waters, bound, dimensions_of
 from glider_stream.scenario import scenario_from_text
 from glider_stream.water.analytic import Uniform
 
@@ -107,6 +107,25 @@ def test_it_says_what_it_is():
         "an estimate of the least time, 3,564 s (0.99 h), no bound: a level set in the mean current"
     )
     assert "50 x 40 x 30 m" in str(deep)
+    assert "by up to 12 s too early" in str(replace(deep, early=12.0))
+    assert replace(deep, early=math.inf).as_dict()["early_s"] is None
+
+
+def test_the_set_at_the_start_is_too_early_by_what_the_current_there_differs(problem):
+    """The current differs by a fifth of the glider's speed at most, on either side of both ends."""
+
+    class Shear(Waters):
+        def current(self, at, since):
+            away = np.array([at[:, 0] - end[0] for end in self.ends]) / (NEAR * 60.0 * self.fastest)
+            along = np.where(np.abs(away[0]) < np.abs(away[1]), *away)
+            return np.stack([0.2 * self.fastest * np.clip(along, -1.0, 1.0), 0.0 * along], axis=1)
+
+    waters = Shear(problem, 2)
+    front = Front(waters, 161, 60.0)
+    assert front.began == pytest.approx(60.0 / 1.2, rel=0.02)
+    assert front.early == pytest.approx(60.0 / 0.8 - 60.0 / 1.2, rel=0.1)
+    front.began = 20.0  # the current differs by more than the glider's speed
+    assert front.early == math.inf
 
 
 def test_the_current_of_any_depth_is_a_bound_where_the_mean_is_an_estimate(problem):
@@ -135,7 +154,8 @@ def test_what_cannot_be_bounded_is_refused(problem):
 
 def test_the_command_line_bounds(capsys, tmp_path):
     said = command(capsys, "bound", scenario_file(tmp_path), "--nodes", 21, "--json")
-    assert said.err.startswith("bound: a grid of ")
+    assert said.err.startswith("bound: grid 1 of 2, 11 x 11 x ")
+    assert "bound: grid 2 of 2, 21 x 21 x " in said.err
     found = strict_json(said.out)
     assert 0.0 < found["least_s"] <= found["time_s"]
     # no route of the roadmap is quicker

@@ -66,8 +66,8 @@ def write_mission(folder):
     return folder / "small-mission.toml"
 
 
-def mission(folder, changes=()):
-    """The small mission, with some values section.key changed."""
+def mission(folder, changes=(), overrides=()):
+    """The small mission, with some values section.key changed; `overrides` are texts for its scenario."""
     file = Path(folder) / "small-mission.toml"
     if not file.exists():
         write_mission(Path(folder))
@@ -75,7 +75,7 @@ def mission(folder, changes=()):
     for place, value in dict(changes).items():
         section, key = place.split(".")
         table[section][key] = value
-    return mission_from_table(table, file)
+    return mission_from_table(table, file, overrides)
 
 
 @cache

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import h5py
@@ -20,6 +21,7 @@ from glider_stream.mission.campaign import identity_of, simulate
 from glider_stream.mission.run import Runner
 from glider_stream.mission.settings import read_mission, shipped_missions
 from glider_stream.mission.statistics import median, share
+from glider_stream.simulated import write_campaign
 
 pytestmark = pytest.mark.slow
 RUNS = 3
@@ -84,6 +86,16 @@ def test_a_cluster_changes_no_bit(folder, alone, monkeypatch):
         monkeypatch.setattr(campaign, "scheduler", lambda address: here)
         found = simulate(small(folder), 2, address="tcp://somewhere:8786")
     same(found, type(alone)(alone.mission, alone.runs[:2], alone.forecast))
+
+
+def test_files_that_change_while_runs_are_flown_are_refused(folder, alone, tmp_path):
+    other = replace(alone, waters="of another file")
+    with pytest.raises(InputError, match="a worker reads other currents or another terrain"):
+        campaign.run_here(campaign.Work(alone.mission, other.waters, {}), 0)
+    assert (alone.mission.text, other.waters) not in campaign._RUNNERS
+    with pytest.raises(InputError, match="put the old files back and give the same command again"):
+        write_campaign(other, [tmp_path / "runs.json"], (0, "replan"))
+    write_campaign(alone, [tmp_path / "runs.json"], (0, "replan"))
 
 
 def test_a_stopped_campaign_goes_on(folder, alone, tmp_path):

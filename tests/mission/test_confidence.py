@@ -10,15 +10,16 @@ import pytest
 from helpers.ionian import write_ionian
 from helpers.missions import EXACT, mission, runner, write_mission
 from helpers.small import command
+from scipy.integrate import solve_ivp
 
 from glider_stream.base.errors import InputError
 from glider_stream.kernels.edges import Status
-from glider_stream.kernels.flow import Extent, RisingOceanGrid, velocities
+from glider_stream.kernels.flow import Extent, RisingOceanGrid, currents, velocities
 from glider_stream.mission.assimilating import corrected
 from glider_stream.mission.confidence.answer import confidence_of
 from glider_stream.mission.confidence.candidates import Search
 from glider_stream.mission.confidence.ensemble import _mean, drawn, first_member, from_files
-from glider_stream.mission.confidence.judged import Criterion, Flights, best_of, checked, lost_leg, quantile
+from glider_stream.mission.confidence.judged import Criterion, Flights, best_of, checked, fly, lost_leg, quantile
 from glider_stream.mission.confidence.reach import reach_of
 from glider_stream.mission.pilot import plan_of
 from glider_stream.mission.run import Runner
@@ -129,10 +130,10 @@ def test_without_errors_a_route_arrives_when_it_says(folder):
     best = answer.best
     assert best.arrived().value == 1.0
     assert best.time == pytest.approx([answer.path.travel_time] * 2, rel=0.01)
-    assert best.candidate.name == "the forecast"
+    assert best.candidate.name == "fastest in the forecast, as trims"
     names = [each.candidate.name for each in answer.flights]
     assert not [
-        name for name in names if name.startswith("member") and "waypoints" not in name
+        name for name in names if name.startswith("fastest in member") and "waypoints" not in name
     ]  # the same orders
     assert set(answer.reach.share) == {0.0, 1.0}  # by that time; members are alike
     assert answer.reach.by == answer.criterion.promised(best.time)
@@ -155,12 +156,15 @@ def test_the_command_chooses_and_looks_at_a_route(folder, capsys, monkeypatch):
         capsys, "confidence", "small-mission.toml", "--draws", "4", "--best", "80%", *outputs, "--json"
     )
     assert said.code == 0, said.err
+    for work in ("legs", "routes", "flights", "tracks"):
+        assert f"confidence: {work}: 4 of 4 members" in said.err
     table = json.loads(said.out)
     chosen = next(row for row in table["candidates"] if row["name"] == table["chosen"]["name"])
     assert chosen["arrived_share"][0] == 1.0  # with four members, 80 % is all of them
     assert chosen["arrival_quantiles_s"]["50%"] < table["promised_by_s"] < LIMIT
     assert (folder / "c.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads((folder / "route.json").read_text())["confidence"]["members"] == 4
+    assert json.loads((folder / "route.json").read_text())["confidence"]["planned_in"] in table["chosen"]["name"]
     assert load_path("route.json").origin is not None
     said = command(
         capsys, "confidence", "small-mission.toml", "route.json", "--draws", "2", "--best", "by", "--by", "0.5"
@@ -282,6 +286,12 @@ def test_members_come_from_files_and_the_forecast_is_their_mean(tmp_path):
     )
     with pytest.raises(InputError, match=r"a\.nc and later\.nc have different times: .*; cut them alike"):
         from_files(read, [tmp_path / "a.nc", tmp_path / "later.nc"])
+    gone = doubled.copy(deep=True)
+    for name in ("uo", "vo"):
+        gone[name][:] = np.where(gone.longitude > 18.6, np.nan, gone[name])
+    gone.to_netcdf(tmp_path / "gone.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"in member gone\.nc, `goal` = .* or leave this member out"):
+        from_files(read, [tmp_path / "a.nc", tmp_path / "gone.nc"])
     with pytest.raises(
         InputError, match=r"members a\.nc and a\.nc hold the same currents; leave one of them out"
     ):
@@ -300,3 +310,37 @@ def test_the_mean_of_rising_members_knows_how_fast_it_may_rise():
     mean = _mean([member(0.01), member(-0.09)])
     assert np.abs(mean.values[..., 2]).max() == pytest.approx(0.04)
     assert mean.max_rise == 0.09
+
+
+def test_members_of_water_that_rises_are_flown_as_another_integrator_flies_them(folder):
+    """In cells, the vehicle without errors: a route's times and ends in each member, by DOP853."""
+    cells = ["flow.kind=convection-cells", "flow.w=0.2", "flow.width=300.0", "flow.depth=150.0"]
+    ensemble = drawn(mission(folder, EXACT | {"forecast_error.rms_share": 0.3}, cells), 2)
+    planned = Search(ensemble).candidates(False)[0]
+    flights = fly(ensemble, [planned], tracks=True)[0]
+    for problem, time, track in zip(ensemble.each(), flights.time, flights.tracks, strict=True):
+        at, now = planned.path.legs[0].start, problem.departure
+        for leg in planned.path.legs:
+            at, now = by_dop853(problem.evaluator.flow, leg, at, now)
+        assert now - problem.departure == pytest.approx(time, abs=0.02)
+        np.testing.assert_allclose(track[-1, 1:], at, rtol=0, atol=0.1)
+
+
+def by_dop853(flow, leg, at, now):
+    """Where a leg's glide ends that begins at a place (3,) [m] and a time [s], and when."""
+    level = leg.speed * math.cos(leg.glide_angle)
+    through = [
+        level * math.cos(leg.heading),
+        level * math.sin(leg.heading),
+        leg.speed * math.sin(leg.glide_angle),
+    ]
+
+    def rate(t, place):
+        return through + currents(flow, *(np.array([value]) for value in (*place, t)))[0]
+
+    def depth(t, place):
+        return place[2] - leg.end[2]
+
+    depth.terminal, depth.direction = True, np.sign(through[2])
+    found = solve_ivp(rate, (now, now + 3000.0), at, "DOP853", events=depth, max_step=10.0, rtol=1e-8, atol=1e-8)
+    return found.y[:, -1], found.t[-1]

@@ -162,6 +162,7 @@ def changed(file, folder, **origin):
     return new
 
 
+@pytest.mark.filterwarnings("always::glider_stream.base.errors.InputWarning")  # a plan without its origin
 def test_the_command(small, capsys, tmp_path):
     said = command(
         capsys, "replan", small / "plan.json", "--fix", "-60,60,200", "--json", "-o", tmp_path / "next.json"
@@ -207,6 +208,7 @@ def test_fixes_that_are_refused(small, capsys, fix):
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.filterwarnings("always::glider_stream.base.errors.InputWarning")  # a plan without its origin
 def test_a_plan_of_another_scenario_is_refused(small, road, tmp_path, capsys):
     plan = small / "plan.json"
     old = without_origin(plan, tmp_path)

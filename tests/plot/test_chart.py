@@ -122,6 +122,11 @@ def test_fronts_are_circles_where_time_is_distance():
     assert len(radii) == math.floor(math.hypot(1000.0, 1000.0) / 360.0)
     for n, radius in enumerate(radii, 1):
         np.testing.assert_allclose(radius, 360.0 * n, atol=8.0)
+    labels = np.array([text.get_position() for text in ax.texts])
+    assert len(labels) >= 3
+    assert np.abs(labels).max() < 1000.0 - 0.03 * 2000.0  # none over the edge
+    apart = np.linalg.norm(labels[:, None] - labels, axis=2)
+    assert apart[~np.eye(len(labels), dtype=bool)].min() > 0.07 * 2000.0
 
 
 def test_fronts_stop_at_the_shore():

@@ -37,6 +37,7 @@ def test_a_coarse_roadmap_and_one_of_few_directions_are_warned_of():
     assert Density(20.0, 160.0, 1.6).warning.startswith(
         "nodes lie 1.6 legs apart, more than 1.15: a query finds a slower route"
     )
-    assert Density(8.0, 80.0, 0.8).warning.startswith("legs leave a node in 8 directions of 36, fewer than 9")
+    assert Density(8.4, 80.0, 0.8).warning.startswith("legs leave a node in 8 directions of 36, fewer than 9")
+    assert Density(8.6, 80.0, 0.8).warning == ""  # shown as 9
     told = "nodes 80 m apart at a depth, 0.80 legs; legs in 20 of 36 directions from a node"
     assert str(Density(20.0, 80.0, 0.8)) == told

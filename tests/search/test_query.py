@@ -1,6 +1,7 @@
 """Queries: against brute force, in any number, with legs that chain."""
 
 import itertools
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,12 +9,13 @@ import pytest
 from helpers.small import SCENARIO, TOLERANCE, K, distance, roadmap, scenario_file, strict_json
 
 from glider_stream import planner
-from glider_stream.base.errors import InputError
+from glider_stream.base.errors import InputError, InputWarning
 from glider_stream.kernels.edges import Status
 from glider_stream.pilot.export import EXPORTS, Options
+from glider_stream.pilot.route_files import read_drawn
 from glider_stream.roadmap.store import write_roadmap
 from glider_stream.scenario import read_scenario, scenario_from_text
-from glider_stream.search.path import load_path
+from glider_stream.search.path import load_path, load_plan, shortened
 from glider_stream.search.query import Planner
 
 START, GOAL = (-190.0, 190.0, 0.0), (160.0, -160.0, 0.0)
@@ -240,6 +242,24 @@ def test_a_path_file_comes_back(tmp_path):
     assert read.as_dict() == path.as_dict()
     assert (read.start == path.start).all()
     assert (read.goal == path.goal).all()
+
+
+def test_a_long_route_is_shown_by_its_ends():
+    lines = [f"  leg {n}" for n in range(40)]
+    assert shortened(lines[:25]) == lines[:25]
+    assert shortened(lines) == [*lines[:10], "  ... 25 more legs, in --json and in the file of -o", *lines[-5:]]
+
+
+def test_a_path_file_without_its_origin_is_an_assumption(tmp_path):
+    file = tmp_path / "path.json"
+    table = json.loads(json.dumps(planner.query(roadmap()).as_dict()))
+    file.write_text(json.dumps({name: value for name, value in table.items() if name != "origin"}))
+    with pytest.warns(
+        InputWarning, match=r"no `origin`, .* taken as metres from the origin of the scenario here"
+    ):
+        assert load_plan(file).origin is None
+    (note,) = read_drawn(file).notes
+    assert "taken as metres from the origin" in note
 
 
 def test_no_path_is_an_answer(tmp_path):

@@ -206,5 +206,5 @@ def test_every_query_tells_how_far_from_the_best_it_may_be(found):
     assert "estimate_of_further_gain" not in before.as_dict()
     assert after.as_dict()["estimate_of_further_gain"] == after.rounds[-1].gain
     assert "by the greatest currents: this one at most" in str(before)
-    assert "--within 0.01" in str(before)
+    assert "--within 1%" in str(before)
     assert str(after).endswith("%, an estimate")

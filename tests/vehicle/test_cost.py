@@ -148,5 +148,5 @@ def test_a_preset_and_what_it_lacks(tmp_path):
     file = scenario_file(tmp_path)
     cost = read_scenario(file, ["cost.kind=energy", "cost.preset=slocum", "cost.trim=7.0"]).cost
     assert (cost.hotel, cost.trim) == (0.5, 7.0)
-    with pytest.raises(InputError, match=r"cost\.(hotel|trim|volume)` is missing"):
+    with pytest.raises(InputError, match=r"cost\.hotel`, .*`cost\.\w+` are missing; give all"):
         read_scenario(file, ["cost.kind=energy"])

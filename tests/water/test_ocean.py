@@ -618,9 +618,14 @@ def test_describe_says_what_was_taken_and_read(tmp_path):
         "5000 m, 2023-02-27T15:00:00: no water, or no data",
         "m/s east",
         "stream value",
-        "flat frame",
+        "flat map",
     ):
         assert words in str(told)
+    u, v = (table["points"][0][name] for name in ("u_east", "v_north"))
+    first = str(told).splitlines()[1]  # what was asked comes first
+    assert first.startswith(f"  20.63, 60.41, 47 m, {PLACE[3]}: {u:+.5f} m/s east, {v:+.5f} m/s north; ")
+    speed, toward = float(first.split()[-6]), math.radians(float(first.split()[-2]))
+    assert (speed * math.sin(toward), speed * math.cos(toward)) == pytest.approx((u, v), abs=0.01)
     with pytest.raises(InputError, match="2023-02-27T00:00:00Z to 2023-02-28"):
         describe(path, at=[(*PLACE[:3], None)])
 

@@ -68,6 +68,7 @@ class Confidence:
             **flights.as_dict(by),
             **({} if by is None else {"by_s": by}),
             "within_m": self.ensemble.mission.arrival.radius_m,
+            "planned_in": flights.candidate.planned,
             "ensemble": self.ensemble.words,
             "flown": "planned anew at each call" if self.replanned else "sent once",
         }
@@ -113,13 +114,16 @@ class Confidence:
             return []
         order = sorted(range(len(self.flights)), key=lambda k: (*self.criterion.rank(self.flights[k].time), k))
         names = [f"{q:.0%} by (h)" for q in QUANTILES]
-        head = f"  {'candidate':<30}{'arrived (%)':<18}" + "".join(f"{name:<14}" for name in names)
+        wide = 2 + max(len(self.flights[k].candidate.name) for k in order[:SHOWN])
+        head = f"  {'candidate':<{wide}}{'arrived (%)':<18}" + "".join(f"{name:<14}" for name in names)
         lines = [head.rstrip()]
         for k in order[:SHOWN]:
             each = self.flights[k]
             times = [quantile(each.time, q) for q in QUANTILES]
             shown = "".join(f"{hours(t) if np.isfinite(t) else '-':<14}" for t in times)
-            lines.append(f"  {each.candidate.name:<30}{each.arrived().told('.0f', 100.0):<18}{shown}".rstrip())
+            lines.append(
+                f"  {each.candidate.name:<{wide}}{each.arrived().told('.0f', 100.0):<18}{shown}".rstrip()
+            )
         left = len(self.flights) - SHOWN
         return lines if left <= 0 else [*lines, f"  and {left} others, in --json"]
 
@@ -142,7 +146,7 @@ def confidence_of(
     search = Search(ensemble, legs=reach or not sent)
     candidates: list[Candidate] = []
     for name, path in sent:
-        candidates += sent_routes(name, placed(path, ensemble.forecast), search.office)
+        candidates += sent_routes(name, placed(path, ensemble.forecast), search.office, planned="its plan")
     candidates = candidates or search.candidates(replanned)
     flights = fly(ensemble, candidates)
     chosen = best_of(np.array([each.time for each in flights]), criterion)

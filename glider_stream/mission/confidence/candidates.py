@@ -18,6 +18,7 @@ from .shared import SharedRoadmap, shared_roadmap
 
 SHARES = (0.5, 0.7, 0.9, 1.0)
 """Routes over the legs that exist in such shares of the members, with the times that these shares keep."""
+FORECAST = "fastest in the forecast"
 
 
 class Sent(Policy):
@@ -39,6 +40,7 @@ class Candidate:
     """A way to fly: a `policy` with its `office`. `path`: the route that is sent; None if the policy makes more.
 
     `member` is the place, among the members, of the one in whose current the route is the fastest; -1 for none.
+    `planned` says in which current the times of the path hold.
     `stops` (n, 2) [m] are the ends of the legs that the vehicle is ordered to fly, if they are known.
     """
 
@@ -48,6 +50,7 @@ class Candidate:
     path: Path | None = None
     member: int = -1
     stops: Array | None = None
+    planned: str = "the forecast"
 
     @property
     def orders(self) -> str | None:
@@ -60,13 +63,17 @@ class Candidate:
         return repr((orders.stops.tolist(), orders.depth.tolist()))
 
 
-def sent_routes(name: str, path: Path, office: Office, member: int = -1) -> list[Candidate]:
+def sent_routes(
+    name: str, path: Path, office: Office, member: int = -1, planned: str = "the forecast"
+) -> list[Candidate]:
     """Return a route that is sent once: as the vehicle steers, and if that is by trims, as waypoints, too."""
-    plans = {name: plan_of(path, office)}
     if office.mission.vehicle.steering == "trims":
-        plans[f"{name}, as waypoints"] = plan_of(path, office, "waypoints")
+        plans = {f"{name}, as {orders}": plan_of(path, office, orders) for orders in ("trims", "waypoints")}
+    else:
+        plans = {name: plan_of(path, office)}
     return [
-        Candidate(title, Sent(plan), office, path, member, _stops_of(plan, path)) for title, plan in plans.items()
+        Candidate(title, Sent(plan), office, path, member, _stops_of(plan, path), planned)
+        for title, plan in plans.items()
     ]
 
 
@@ -99,7 +106,7 @@ class Search:
         return _distinct(found)
 
     def _policies(self) -> list[Candidate]:
-        offices = {"the forecast": self.office}
+        offices = {FORECAST: self.office}
         if self.shared is not None:
             problem, mission = self.office.problem, self.office.mission
             offices |= {_legs_of(share): Office(problem, mission, self.shared.over(share)) for share in SHARES}
@@ -107,7 +114,7 @@ class Search:
 
     def _routes(self) -> list[Candidate]:
         """Return the fastest route in the forecast, and those over legs that many members have."""
-        routes = {"the forecast": self.office.planner.query()}
+        routes = {FORECAST: self.office.planner.query()}
         if self.shared is not None:
             routes |= {_legs_of(share): self._over(share) for share in SHARES}
         return [
@@ -123,12 +130,12 @@ class Search:
     def _of_members(self) -> list[Candidate]:
         """Return the fastest route in each member's current."""
         found, rule = [], self.office.mission.pilot.rule
-        for n, problem in enumerate(self.ensemble.each()):
+        for n, problem in enumerate(self.ensemble.each("routes")):
             road = None if self.shared is None else self.shared.members[n]
             path = planner_of(problem, road, rule).query()
             if path.legs:
                 name = f"member {self.ensemble.numbers[n]}"
-                found += sent_routes(name, path, self.office, n)
+                found += sent_routes(f"fastest in {name}", path, self.office, n, name)
         return found
 
     def _depth_averaged(self, replanned: bool) -> Candidate:
@@ -143,7 +150,7 @@ class Search:
 
 
 def _legs_of(share: float) -> str:
-    return f"the legs of {share:.0%}"
+    return f"fastest over legs of {share:.0%}"
 
 
 def _distinct(candidates: Sequence[Candidate]) -> list[Candidate]:

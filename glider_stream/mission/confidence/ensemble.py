@@ -1,6 +1,6 @@
 """Ensembles: the problems of currents that may be, which differ in nothing but the current."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,10 +27,27 @@ KEPT = 64
 
 
 @dataclass(frozen=True)
+class Progress:
+    """How many members of all are done with some work, `what` in words."""
+
+    done: int
+    total: int
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.done} of {self.total} members"
+
+
+def _silent(progress: Progress) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True)
 class Ensemble:
     """The members of an ensemble, and the `forecast` that a pilot plans with.
 
     `numbers`: those of the members, by which currents and the vehicle's errors are drawn. `words` describe them.
+    `names`: those of members that were read from files. `progress` is told of each member that is done.
     """
 
     mission: Mission
@@ -39,16 +56,19 @@ class Ensemble:
     words: str
     worlds: Worlds | None = None
     members: dict[int, Problem] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
+    progress: Callable[[Progress], None] = _silent
 
     @property
     def count(self) -> int:
         """The number of members."""
         return len(self.numbers)
 
-    def each(self) -> Iterator[Problem]:
-        """Yield the members' problems, in the order of `numbers`."""
-        for number in self.numbers:
+    def each(self, what: str = "members") -> Iterator[Problem]:
+        """Yield the members' problems, in the order of `numbers`; `what` says for which work."""
+        for done, number in enumerate(self.numbers, 1):
             yield self._member(number)
+            self.progress(Progress(done, self.count, what))
 
     def _member(self, number: int) -> Problem:
         made = self.members.get(number)
@@ -65,7 +85,19 @@ class Ensemble:
             self.forecast.check_point(point, name)
             up = f"a route with confidence begins and ends at the surface; got a {name} at {-point[2]:g} m"
             require(is_up(float(point[2])), up)
-        return replace(self, forecast=replace(self.forecast, start=start, goal=goal))
+        return replace(self, forecast=replace(self.forecast, start=start, goal=goal)).checked()
+
+    def checked(self) -> "Ensemble":
+        """Return the ensemble; InputError if a member that was read from a file has no water at an end."""
+        for number, name in zip(self.numbers, self.names, strict=bool(self.names)):
+            problem = self._member(number)
+            try:
+                for end in ("start", "goal"):
+                    problem.check_point(getattr(problem, end), end)
+            except InputError as error:
+                cure = "or leave this member out (a place without data counts as land)"
+                raise InputError(f"in member {name}, {error}, {cure}") from None
+        return self
 
     def _like_the_forecast(self, member: Problem) -> Problem:
         """Return the forecast's problem with a member's current and terrain."""
@@ -95,7 +127,8 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
     problems = [_timed(scenario.problem()) for scenario in scenarios]
     if len(files) == len(problems) and is_steady(problems[0].evaluator.flow):
         _check_alike(mission.scenario, files)
-    _check_each_once(files, [flow_sha256(problem.evaluator.flow) for problem in problems])
+    labelled = [_name_of(scenario) for scenario in scenarios]
+    _check_each_once(labelled, [flow_sha256(problem.evaluator.flow) for problem in problems])
     for problem in problems:
         check_known(problem, mission, "members' current")
     check_ends(problems[0])
@@ -109,15 +142,22 @@ def from_files(mission: Mission, files: Sequence[str | Path]) -> Ensemble:
         numbers,
         f"{len(problems)} members of {names}; the forecast is their mean",
         members=dict(zip(numbers, problems, strict=True)),
-    )
+        names=tuple(labelled),
+    ).checked()
 
 
-def _check_each_once(files: Sequence[str | Path], digests: Sequence[str]) -> None:
+def _name_of(member: Scenario) -> str:
+    """Return the name of a member for people: its file, or its label there."""
+    flow = member.flow
+    assert isinstance(flow, OceanFlow)
+    file = Path(flow.file[0]).name
+    return file if flow.member is None else f"{flow.member} of {file}"
+
+
+def _check_each_once(names: Sequence[str], digests: Sequence[str]) -> None:
     """Raise InputError if two members hold the same currents: they would count twice."""
-    each_its_file = len(files) == len(digests)
     seen: dict[str, str] = {}
-    for n, digest in enumerate(digests):
-        name = Path(files[n]).name if each_its_file else f"number {n} of {Path(files[0]).name}"
+    for name, digest in zip(names, digests, strict=True):
         cure = "leave one of them out"
         require(digest not in seen, f"members {seen.get(digest)} and {name} hold the same currents; {cure}")
         seen[digest] = name

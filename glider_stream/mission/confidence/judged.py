@@ -76,7 +76,9 @@ def fly(ensemble: Ensemble, candidates: Sequence[Candidate], tracks: bool = Fals
     touched, lost = np.zeros(time.shape, bool), np.full(time.shape, -1)
     ended = [[""] * count for _ in candidates]
     kept: list[list[Array]] = [[] for _ in candidates]
-    for n, (number, problem) in enumerate(zip(ensemble.numbers, ensemble.each(), strict=True)):
+    for n, (number, problem) in enumerate(
+        zip(ensemble.numbers, ensemble.each("tracks" if tracks else "flights"), strict=True)
+    ):
         for k, candidate in enumerate(candidates):
             flight = fly_run(problem, candidate.policy, candidate.office, candidate.name, number)
             outcome = flight.outcome

@@ -46,7 +46,7 @@ def reach_of(search: Search, by: float) -> Reach:
     shared = search.shared
     position = node_positions(problem) if shared is None else shared.forecast.position
     count = np.zeros(len(position))
-    for n, member in enumerate(search.ensemble.each()):
+    for n, member in enumerate(search.ensemble.each("reach")):
         if shared is None:
             arrives = ClockPlanner(member, position).arrivals()
         else:

@@ -44,7 +44,7 @@ def shared_roadmap(ensemble: Ensemble) -> SharedRoadmap:
     """Return the roadmap over the members of a steady ensemble."""
     road = build_roadmap(ensemble.forecast)
     members, times = [], []
-    for problem in ensemble.each():
+    for problem in ensemble.each("legs"):
         found = _legs_in(road, problem)
         members.append(found)
         times.append(_spread(road, found))

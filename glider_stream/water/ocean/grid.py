@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ...base.arrays import Array, Bools
 from ...base.checks import Range
 from ...base.errors import InputError
+from ...base.nearest import tree_of
 from ...base.settings import require
 from ..frame import LocalFrame, eastward, wrapped
 
@@ -241,7 +241,7 @@ class CurvedGrid:
 
     def _box(self, lon: Array, lat: Array, margin: int) -> tuple[slice, slice]:
         """Return the rows and columns about the points nearest to some places."""
-        tree = KDTree(self._vectors.reshape(-1, 3))
+        tree = tree_of(self._vectors.reshape(-1, 3))
         nearest = np.asarray(tree.query(unit_vectors(lon, lat))[1])
         j, i = np.unravel_index(nearest, self.shape)
         rows, across = (
@@ -288,7 +288,7 @@ class CurvedGrid:
         to = np.stack([np.ravel(x), np.ravel(y)], axis=-1)
         at = np.stack(frame.to_local(self.lon, self.lat), axis=-1)
         last_j, last_i = (n - 2 for n in self.shape)
-        nearest = np.asarray(KDTree(at.reshape(-1, 2)).query(to)[1])
+        nearest = np.asarray(tree_of(at.reshape(-1, 2)).query(to)[1])
         j, i = (part.astype(np.float64) for part in np.unravel_index(nearest, self.shape))
         for _ in range(NEWTON_STEPS):
             cell_j = np.clip(np.floor(j), 0, last_j).astype(np.intp)

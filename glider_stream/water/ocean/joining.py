@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ...base.arrays import Array, Bools
 from ...base.errors import InputError
+from ...base.nearest import tree_of
 from ...base.settings import require
 from .file import OceanFile, Times
 from .grid import Grid, grid_of, unit_vectors
@@ -349,7 +349,7 @@ def _seabed_at(first: Field, second: Field | None, grid: Grid) -> Array:
     for field in (first, second):
         if field is None:
             continue
-        tree = KDTree(unit_vectors(field.lon, field.lat))
+        tree = tree_of(unit_vectors(field.lon, field.lat))
         off, near = map(np.asarray, tree.query(unit_vectors(lon, lat).reshape(-1, 3), k=2))
         # the point itself, or the two that it lies between
         exact = off[:, 0] < 0.1 * off[:, 1]

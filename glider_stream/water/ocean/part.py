@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ...base.arrays import Array
+from ...base.nearest import tree_of
 from .file import Times
 from .grid import Grid, unit_vectors
 from .land import Evidence
@@ -52,7 +52,7 @@ class Field:
     def at(self, lon: Array, lat: Array) -> Array | None:
         """Return the values at the points (ny, nx) if these are the field's own points, else None."""
         points = unit_vectors(lon, lat)
-        tree = KDTree(unit_vectors(self.lon, self.lat))
+        tree = tree_of(unit_vectors(self.lon, self.lat))
         off, nearest = map(np.asarray, tree.query(points.reshape(-1, 3)))
         cell = np.linalg.norm(np.diff(points, axis=1), axis=-1).max(initial=0.0)
         return self.values[nearest].reshape(lon.shape) if float(off.max()) < 0.2 * cell else None
@@ -63,7 +63,7 @@ class Field:
         cell = np.linalg.norm(np.diff(points, axis=1), axis=-1).max(initial=0.0)
         if self.lon.size == 0:
             return np.full(lon.shape, np.nan)
-        tree = KDTree(unit_vectors(self.lon, self.lat))
+        tree = tree_of(unit_vectors(self.lon, self.lat))
         off, near = map(np.asarray, tree.query(points.reshape(-1, 3), k=min(4, self.lon.size)))
         off, near = off.reshape(lon.size, -1), near.reshape(lon.size, -1)
         around = np.where(off <= 1.2 * cell, self.values[near], np.inf)

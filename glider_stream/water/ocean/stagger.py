@@ -2,9 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ...base.arrays import Array
+from ...base.nearest import tree_of
 from ...base.settings import require
 from ..frame import wrapped
 from .grid import unit_vectors
@@ -63,7 +63,7 @@ def collocated(
     )
     require(min(along.shape[:2]) > 1 and min(across.shape[:2]) > 1, refusal)
     j, i = along.shape[0] // 2, along.shape[1] // 2
-    nearest = int(KDTree(across.reshape(-1, 3)).query(along[j, i])[1])
+    nearest = int(tree_of(across.reshape(-1, 3)).query(along[j, i])[1])
     shift_j, shift_i = nearest // across.shape[1] - j, nearest % across.shape[1] - i
     rows = slice(max(0, -shift_j), min(along.shape[0], across.shape[0] - shift_j))
     cols = slice(max(0, -shift_i), min(along.shape[1], across.shape[1] - shift_i))
