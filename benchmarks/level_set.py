@@ -58,7 +58,7 @@ from scipy.optimize import minimize
 
 from glider_stream.base.errors import InputError
 from glider_stream.base.settings import require
-from glider_stream.kernels.flow import velocities
+from glider_stream.kernels.flow import rises, velocities
 from glider_stream.kernels.motion import rk4_step
 from glider_stream.kernels.place import Place, Velocity
 from glider_stream.roadmap.problem import Problem
@@ -285,7 +285,10 @@ def shorten(waters: Waters, path: np.ndarray, duration: float) -> dict[str, floa
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     """Every grid, coarse to fine; the path from above; what they say together."""
-    waters = Waters(read_scenario(args.scenario, args.set).problem())
+    problem = read_scenario(args.scenario, args.set).problem()
+    level = not rises(problem.evaluator.flow)
+    require(level, "the current has a vertical part, which this script leaves out; use `glider-stream bound`")
+    waters = Waters(problem)
     slower = [waters.quickening(end, args.tau) for end in waters.ends]
     backwards = waters.steady and slower[1] < slower[0]
     shapes = [tuple(int(n) for n in text.split(",")) for text in args.grid or GRIDS]
