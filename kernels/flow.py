@@ -56,9 +56,9 @@ class Ladder(NamedTuple):
     """The heights at which steps end in a file's currents, its rungs: between them the currents bend little.
 
     `rungs` (2, levels + 1, 2) [m]: for legs, and for fans; from below the lowest level, above it, ..., above the
-    last one: the next rung downward and upward. A step of a leg lasts `longest` [s] at most; 0 where there is no
-    ladder, and steps are even. The bends that its steps pass over move a leg's end by `shift` [m^2/s] over its
-    vertical speed at most.
+    last one: the next rung downward and upward. A step of a leg lasts `longest` [s] at most, or as
+    an even step if that is longer; 0 where there is no ladder, and steps are even. The bends that its steps pass
+    over move a leg's end by `shift` [m^2/s] over its vertical speed at most.
     """
 
     rungs: Array
@@ -748,7 +748,7 @@ def step_to_rung(flow: Flow, use: Any, z: float, w: float, left: float, longest:
 
 
 def longest_step(flow: Flow) -> float:
-    """Return the longest step [s] of a leg on the flow's ladder; 0 without a ladder."""
+    """Return the `longest` step [s] of the flow's ladder; 0 without a ladder."""
     return ABILITIES[type(flow)].longest_step(flow)
 
 

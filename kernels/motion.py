@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .cache import entry_point, in_kernels, inlined, kernel, making
+from .cache import entry_point, in_kernels, inlined, kernel, making, shared
 from .flow import (
     LEGS,
     Flow,
@@ -211,10 +211,10 @@ _CLOSEST = (_closest_level, _closest_rising)
 in_kernels(closest_approach, by_rise(*_CLOSEST))
 
 
-@inlined
-def most_step(flow, dt):
-    """Return the longest step [s] of a leg on a flow's ladder, where even steps would last `dt` [s]."""
-    return min(STRETCH * dt, longest_step(flow))
+@shared
+def most_step(flow: Flow, dt: float) -> float:
+    """Return the longest step [s] of a leg on a flow's ladder; no shorter than the even step `dt` [s]."""
+    return min(STRETCH * dt, max(dt, longest_step(flow)))
 
 
 @making

@@ -41,8 +41,10 @@ class Evaluator:
         object.__setattr__(
             self, "steering", self.steering.in_flow(self.flow, self.integration.dt * self.integration.steps)
         )
+        ladder = flow.ladder_in(self.flow)
+        needless = ladder.shift == 0.0 and ladder.longest <= self.integration.dt
         # a method that tries controls one by one counts even steps
-        if self.steering.counts_steps:
+        if self.steering.counts_steps or needless:
             object.__setattr__(self, "flow", flow.on_even_steps(self.flow))
 
     def on_even_steps(self) -> "Evaluator":

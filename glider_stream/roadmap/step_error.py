@@ -10,7 +10,7 @@ from ..base.arrays import Array, Index
 from ..base.settings import require
 from ..kernels.edges import CONNECTED, Edge
 from ..kernels.flow import OceanGrid, ladder_in
-from ..kernels.motion import STRETCH
+from ..kernels.motion import most_step
 from ..water.ocean.ladder import kink_shift
 from .problem import Problem
 from .roadmap import BaseRoadmap, Edges, Provenance, in_order
@@ -105,7 +105,7 @@ def step_error(problem: Problem, start: Array, values: Array) -> StepError:
     ladder = ladder_in(evaluator.flow)
     if not (ladder.longest and isinstance(evaluator.flow, OceanGrid)):
         return error
-    longest = min(STRETCH * integration.dt, ladder.longest)
+    longest = most_step(evaluator.flow, integration.dt)
     kink = kink_shift(evaluator.flow, longest)
     return replace(error, longest=longest, bound=ladder.shift / slowest, kink=kink)
 

@@ -312,6 +312,7 @@ def test_the_mean_of_rising_members_knows_how_fast_it_may_rise():
     assert mean.max_rise == 0.09
 
 
+@pytest.mark.wide
 def test_members_of_water_that_rises_are_flown_as_another_integrator_flies_them(folder):
     """In cells, the vehicle without errors: a route's times and ends in each member, by DOP853."""
     cells = ["flow.kind=convection-cells", "flow.w=0.2", "flow.width=300.0", "flow.depth=150.0"]

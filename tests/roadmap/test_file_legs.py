@@ -9,6 +9,7 @@ import pytest
 
 from glider_stream.kernels.edges import GLIDE_ANGLE, SPEED, STATUS, Edge, Status
 from glider_stream.kernels.flow import NO_LADDER
+from glider_stream.kernels.motion import most_step
 from glider_stream.kernels.terrain import Seabed
 from glider_stream.roadmap.evaluator import Evaluator
 from glider_stream.roadmap.steering import CALM_FAN, FAN, FlowMapMethod, IntegrationSettings, StreamlineMethod
@@ -94,7 +95,7 @@ def test_legs_on_a_ladder_end_where_dop853_ends_within_the_bound(charted, swum):
     legs = values[some, STATUS + 1 :]
     off = replayed_misses(evaluator, 60.0, places, source[some], target[some], legs)
     slowest = np.abs(values[some, SPEED] * np.sin(values[some, GLIDE_ANGLE]))
-    kink = kink_shift(charted, charted.ladder.longest)
+    kink = kink_shift(charted, most_step(charted, 60.0))
     assert (off <= 0.01 + charted.ladder.shift / slowest + kink).all()
     assert off.max() < 0.15
     even = evaluator.on_even_steps()
