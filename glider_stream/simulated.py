@@ -8,7 +8,7 @@ import numpy as np
 
 from .base.output import check_output, replacing
 from .base.settings import require
-from .mission.campaign import Campaign, waters_sha256
+from .mission.campaign import Campaign
 from .mission.replay import path_of
 from .mission.run import Runner
 from .mission.settings import Mission
@@ -51,7 +51,7 @@ def write_campaign(campaign: Campaign, outputs: Sequence[str | Path], show: Show
     if not outputs:
         return
     runner = Runner(campaign.mission)
-    require(not campaign.waters or waters_sha256(runner.worlds.read) == campaign.waters, CHANGED)
+    require(not campaign.waters or runner.worlds.sha256 == campaign.waters, CHANGED)
     for output in outputs:
         _WRITERS[Path(output).suffix.lower()](campaign, runner, Path(output), show)
 

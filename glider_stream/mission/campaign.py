@@ -22,11 +22,11 @@ from ..base.threads import threads
 from ..jobs.cluster import check_software, scheduler, software
 from ..kernels.cache import KERNEL_DIGEST
 from ..roadmap.problem import Problem
-from ..water.inspect import flow_sha256
 from .journal import Run, RunJournal
 from .run import Outcome, Runner
 from .settings import Mission
 from .statistics import REFERENCE, Row, row_of
+from .world import waters_sha256
 
 FORMAT = "glider-stream/campaign"
 CHECKPOINT = 30.0
@@ -205,12 +205,6 @@ def identity_of(mission: Mission, waters: Sequence[Problem]) -> dict[str, str]:
     }
 
 
-def waters_sha256(waters: Sequence[Problem]) -> str:
-    """Return the SHA-256 of the currents and the terrain of some problems, one after another."""
-    read = [part for water in waters for part in (water.evaluator.flow, water.evaluator.terrain)]
-    return " ".join(flow_sha256(part) for part in read)
-
-
 def forget(keep: Path) -> None:
     """Remove the journal of a campaign whose results are written."""
     target = keep.resolve()
@@ -219,8 +213,7 @@ def forget(keep: Path) -> None:
 
 def _campaign(runner: Runner, runs: list[Run], forecast: str) -> Campaign:
     ordered = sorted(runs, key=lambda run: run[0].number)
-    waters = waters_sha256(runner.worlds.read)
-    return Campaign(runner.mission, tuple(tuple(run) for run in ordered), forecast, waters)
+    return Campaign(runner.mission, tuple(tuple(run) for run in ordered), forecast, runner.worlds.sha256)
 
 
 def _found(
@@ -254,7 +247,7 @@ class Work:
 
 
 def _work_of(runner: Runner) -> Work:
-    return Work(runner.mission, waters_sha256(runner.worlds.read), software())
+    return Work(runner.mission, runner.worlds.sha256, software())
 
 
 _RUNNERS: dict[tuple[str, str], Runner] = {}
@@ -272,7 +265,7 @@ def run_here(work: Work, number: int) -> Run:
         key = work.mission.text, work.waters
         if key not in _RUNNERS:
             runner = Runner(work.mission)
-            require(waters_sha256(runner.worlds.read) == work.waters, CHANGED)
+            require(runner.worlds.sha256 == work.waters, CHANGED)
             _RUNNERS.clear()
             _RUNNERS[key] = runner
         return _RUNNERS[key].run(number)

@@ -1,7 +1,9 @@
 """The world of a mission: the true current, and the forecast that a pilot has instead."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -11,7 +13,7 @@ from ..base.settings import require
 from ..kernels import flow as kernel
 from ..kernels.flow import currents, velocities
 from ..roadmap.problem import Problem
-from ..water.inspect import divergence_ratio, is_steady
+from ..water.inspect import divergence_ratio, flow_sha256, is_steady
 from ..water.ocean.flow import grid_flow, slots
 from ..water.ocean.vertical import with_rise
 from ..water.sampled import sample_flow
@@ -63,6 +65,12 @@ def seeds_of(mission: Mission, number: int) -> tuple[np.random.SeedSequence, np.
     return error, vehicle
 
 
+def waters_sha256(waters: Sequence[Problem]) -> str:
+    """Return the SHA-256 of the currents and the terrain of some problems, one after another."""
+    read = [part for water in waters for part in (water.evaluator.flow, water.evaluator.terrain)]
+    return " ".join(flow_sha256(part) for part in read)
+
+
 class Worlds:
     """The worlds of all runs of a mission; the true current is the same in all of them."""
 
@@ -97,10 +105,10 @@ class Worlds:
         evaluator = replace(self.true.evaluator, flow=flow)
         return self._made(replace(self.true, evaluator=evaluator), _rms(self._read(flow) - exact))
 
-    @property
-    def read(self) -> tuple[Problem, ...]:
-        """What is read from files: the true current, and the forecast if it has files of its own."""
-        return (self.true,) if self._fixed is None else (self.true, self._fixed.forecast)
+    @cached_property
+    def sha256(self) -> str:
+        """The digest of what is read from files: the true current, and the forecast if it has its own files."""
+        return waters_sha256([self.true] if self._fixed is None else [self.true, self._fixed.forecast])
 
     def _read(self, flow: kernel.Flow) -> Array:
         return np.asarray(velocities(flow, *self._sample))

@@ -2,6 +2,7 @@
 
 import math
 from importlib.metadata import version
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -97,9 +98,11 @@ def test_ways_around_a_disk_are_little_longer_than_the_shortest():
 
 
 def test_ways_around_a_disk_are_as_long_as_those_of_ompl():
-    base = pytest.importorskip("ompl.base", reason="OMPL is not installed")
+    if find_spec("ompl") is None:
+        pytest.skip("OMPL is not installed")
     if version("ompl").startswith("1."):
-        pytest.skip("OMPL 1 takes no plain functions; 2.0.1 does")
+        pytest.skip("Python ends with a segmentation fault where OMPL 1.7.0 was loaded; 2.0.1 is well")
+    from ompl import base
     from ompl.geometric import FMT
 
     theirs = []
