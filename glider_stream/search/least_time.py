@@ -77,7 +77,7 @@ class GreatestSpeeds:
         speed = np.full(int(strip.max()) + 3, -np.inf)
         np.maximum.at(speed, strip.ravel(), fastest.ravel())
         # a cell is up to 1.42 strips wide, so the speed of a strip also counts in the strips beside it
-        rate = np.maximum(self.through + _greatest_around(speed, 0, 1), SLOWEST)
+        rate = np.maximum(self.through + _with_neighbours(speed, 0), SLOWEST)
         time: Array = np.concatenate([[0.0], np.cumsum(size / rate)])
         edges: Array = first + size * np.arange(speed.size + 1.0)
         return edges, time
@@ -165,7 +165,7 @@ def greatest(
             uv = kernel.velocities(flow, px, py, np.full(px.size, height), np.full(px.size, t))
             found = np.maximum(found, (uv @ directions).T.reshape(found.shape))
     cells = found.reshape(directions.shape[1], x.size, 2, y.size, 2).max(axis=(2, 4))
-    spread: Array = _greatest_around(_greatest_around(cells, 1, 1), 2, 1) + SPARE * flow.extent.max_speed
+    spread: Array = _with_neighbours(_with_neighbours(cells, 1), 2) + SPARE * flow.extent.max_speed
     return np.minimum(spread, flow.extent.max_speed)
 
 
@@ -179,6 +179,8 @@ def _of_grid(
     directions: Array,
 ) -> Array:
     """Return the same for a grid; it is a true bound, because interpolation stays between the grid's values."""
+    from scipy.ndimage import maximum_filter
+
     first = max(int(np.searchsorted(flow.times, since, side="right")) - 1, 0)
     low = max(int(np.searchsorted(flow.levels, z[0], side="right")) - 1, 0)
     high = int(np.searchsorted(flow.levels, z[1], side="left")) + 1
@@ -190,20 +192,21 @@ def _of_grid(
     # the number of indices that a cell spans; the map of indices is smooth
     moved = _indices(flow, x + size, y), _indices(flow, x, y + size)
     span = max(float(np.abs(index - near).max()) for index in moved)
-    away = math.ceil(span) + 1
-    wide = _greatest_around(_greatest_around(known, 1, away), 2, away)
+    width = 2 * (math.ceil(span) + 1) + 1
+    wide: Array = maximum_filter(known, (1, width, width))
     i, j = (np.clip(np.round(near[n]).astype(np.int64), 0, flow.values.shape[2 + n] - 1) for n in range(2))
     return np.minimum(wide[:, i, j], flow.extent.max_speed)
 
 
-def _greatest_around(values: Array, axis: int, away: int) -> Array:
-    """Return for each value the greatest of those at most `away` from it along an axis.
+def _with_neighbours(values: Array, axis: int) -> Array:
+    """Return for each value the greatest of it and the one or two beside it along an axis.
 
-    SciPy's `maximum_filter` does the same, but loading its ndimage takes a tenth of a small query.
+    SciPy's `maximum_filter` does the same, but loading its ndimage takes a tenth of a small query, whose flow is
+    given by a formula.
     """
-    beyond = [(away, away) if n == axis else (0, 0) for n in range(values.ndim)]
+    beyond = [(1, 1) if n == axis else (0, 0) for n in range(values.ndim)]
     padded = np.pad(values, beyond, constant_values=-np.inf)
-    found: Array = sliding_window_view(padded, 2 * away + 1, axis).max(axis=-1)
+    found: Array = sliding_window_view(padded, 3, axis).max(axis=-1)
     return found
 
 
