@@ -571,7 +571,8 @@ def _step_to_rung(flow, use, z, w, left, longest):
     layer = layer if beyond >= levels[0] else np.uintp(0)
     layer = layer if beyond < levels[np.uintp(levels.size - 1)] else np.uintp(levels.size)
     span = abs((flow.ladder.rungs[use, layer, np.uintp(1 if way > 0.0 else 0)] - z) / w)
-    span = abs(left) if abs(left) <= span * NEARLY else span
+    # without vertical speed the time to a rung is infinite, or NaN at the rung itself
+    span = span if span * NEARLY < abs(left) else abs(left)
     span = span if span <= longest else span / math.ceil(span / longest)
     return math.copysign(span, left)
 

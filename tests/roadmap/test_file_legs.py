@@ -104,6 +104,16 @@ def test_legs_on_a_ladder_end_where_dop853_ends_within_the_bound(charted, swum):
     assert told.off < 0.3 < replayed_off(even, places, source[some], target[some], legs)
 
 
+def test_a_drift_at_a_rung_takes_its_whole_time(charted, swum):
+    """Without vertical speed no rung is ever reached, not even that at which the drift begins."""
+    still = Edge(Status.CONNECTED, 300.0, 300.0, 0.0, 0.0, 0.0, 0.0)
+    for height in (0.0, *charted.levels):
+        path = swum[0].trace(np.array([0.0, 0.0, height]), still, 60.0)
+        assert path[-1, 0] == 360.0
+        assert np.isfinite(path).all()
+        assert (path[:, 3] == height).all()
+
+
 def replayed_off(evaluator, places, source, target, legs):
     """Return how far from their targets legs end at most in an evaluator's own steps [m]."""
     ends = [
