@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from glider_stream.kernels.flow import FANS, LEGS
-from glider_stream.water.ocean.ladder import SHIFTS, bends, fewest_steps, ladder_of, most_shift, step_errors
+from glider_stream.water.ocean.ladder import (
+    MOST_PASSED,
+    SHIFTS,
+    bends,
+    fewest_steps,
+    ladder_of,
+    most_shift,
+    step_errors,
+)
 
 LEVELS = -np.array([260.0, 180.0, 130.0, 90.0, 55.0, 34.0, 21.0, 13.0, 8.0, 4.0, 1.5])
 
@@ -74,3 +82,13 @@ def test_cells_and_times_shorten_steps_whatever_the_currents_are(columns):
     assert longest == [200.0, 50.0]
     times = np.array([0.0, 600.0])
     assert [ladder_of(each, LEVELS, times, 6000.0).longest for each in (columns, 2 * columns)] == [10.0, 10.0]
+
+
+def test_of_many_levels_steps_pass_so_many_at_most():
+    heights = np.linspace(-500.0, 0.0, 401)
+    error = step_errors(heights, np.random.default_rng(4).uniform(0.0, 1e-6, heights.size))
+    passed = np.arange(401)[None, :] - np.arange(401)[:, None]
+    np.testing.assert_array_equal(np.isfinite(error), (passed > 0) & (passed <= MOST_PASSED))
+    path = fewest_steps(error, 100.0)
+    assert len(path) == 1 + 400 // MOST_PASSED
+    assert fewest_steps(np.full((5, 5), np.nan), 1.0)  # ends, whatever the currents are

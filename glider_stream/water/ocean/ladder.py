@@ -20,6 +20,8 @@ CELL_SHARE, TIME_SHARE = 1 / 30, 1 / 60
 """A step is so short that at FASTEST [m/s] it passes this share of a cell, and it lasts this share of the time
 between two times of the file. Both are the same for all forecasts on one grid."""
 FASTEST = 1.0
+MOST_PASSED = 100
+"""A step ends at one of so many next heights: files of more levels than that are fine enough."""
 WORST_MIDDLE = 24.0
 """K(s) is at most one over this, in the middle of a step."""
 
@@ -44,12 +46,19 @@ def bends(values: Array, levels: Array) -> Array:
 
 
 def step_errors(heights: Array, bend: Array) -> Array:
-    """Return the error times the vertical speed of a step from each height to each higher one, (n, n) [m^2/s]."""
-    low, high, at = heights[:, None, None], heights[None, :, None], heights[None, None, :]
-    span = np.where(high > low, high - low, 1.0)
-    share = (at - low) / span
-    share = np.clip(np.minimum(share, 1.0 - share), 0.0, None)
-    return np.asarray((bend * span[..., 0:1] ** 2 * np.abs(share**2 / 2 - share / 6)).sum(axis=-1))
+    """Return the error times the vertical speed of a step from each height to each higher one, (n, n) [m^2/s].
+
+    inf where no step leads: to a height that is not higher, or that lies more than MOST_PASSED further on.
+    """
+    error = np.full((heights.size, heights.size), np.inf)
+    for low in range(heights.size - 1):
+        some = slice(low, low + MOST_PASSED + 1)
+        along = heights[some] - heights[low]
+        span = along[1:, None]
+        share = np.clip(np.minimum(along / span, 1.0 - along / span), 0.0, None)
+        kernel = np.abs(share**2 / 2 - share / 6)
+        error[low, low + 1 : low + along.size] = (bend[some] * span**2 * kernel).sum(axis=-1)
+    return error
 
 
 def fewest_steps(error: Array, most: float) -> list[int]:
@@ -58,10 +67,11 @@ def fewest_steps(error: Array, most: float) -> list[int]:
     Steps lead from the first height to the last one; `error` (n, n) as `step_errors` gives it.
     """
     n = len(error)
-    error = np.where(np.triu(np.ones((n, n), dtype=bool), 1), error, np.inf)
     least, before = np.full(n, np.inf), []
     least[0] = 0.0
-    while not least[-1] <= most:
+    for _ in range(n - 1):  # so many steps, from each height to the next, err nowhere
+        if least[-1] <= most:
+            break
         total = least[:, None] + error
         before.append(total.argmin(axis=0))
         least = total.min(axis=0)
